@@ -1,0 +1,34 @@
+"""Where the sun and the satellite stand, seen from a column."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+class Geometry(eqx.Module):
+    """Directions of the sun and of the satellite at the ground point of one column.
+
+    Angles and not their cosines are the state, so that a derivative at nadir has a meaning.
+
+    Parameters
+    ----------
+    solar_zenith, view_zenith
+        Angles from the local vertical, 0 to below pi/2. [rad]
+    relative_azimuth
+        Azimuth of the satellite minus azimuth of the sun, both seen from the ground: 0 with sun
+        and satellite on the same side (backscatter), pi where a mirror would glint. [rad]
+    """
+
+    solar_zenith: Float[Array, "*batch"]
+    view_zenith: Float[Array, "*batch"]
+    relative_azimuth: Float[Array, "*batch"]
+
+    @property
+    def mu0(self) -> Float[Array, "*batch"]:
+        """Cosine of the solar zenith angle. [-]"""
+        return jnp.cos(self.solar_zenith)
+
+    @property
+    def mu(self) -> Float[Array, "*batch"]:
+        """Cosine of the view zenith angle. [-]"""
+        return jnp.cos(self.view_zenith)

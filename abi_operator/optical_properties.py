@@ -1,0 +1,109 @@
+r"""The waist: all that optics and solver share.
+
+Every producer (air, cloud, plume) describes its part of a column by what *adds*: extinction, and
+one `Scatterer` for each kind of particle. Mixing is then ``+``, and single-scattering albedo,
+moments and phase function of the mixture are derived once, here. A scatterer keeps its phase
+function as an object instead of a table of moments: a producer need not know how many streams the
+solver has, long series of moments never exist, and the exact single scattering reads the closed
+form.
+
+Extinction has a leading axis ``term``, over which radiances are summed with `weight`: the
+exponentials of a band's gas transmission. Grey matter has one term of weight 1.
+"""
+
+from typing import Self
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._numerics import safe_divide
+
+
+class PhaseFunction(eqx.Module):
+    """Angular distribution of single scattering, rotationally symmetric."""
+
+    def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
+        r"""Legendre moments :math:`\chi_l`, :math:`\chi_0 = 1`, without the factor 2l + 1. [-]"""
+        raise NotImplementedError
+
+    def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
+        """Phase function at a scattering angle, mean 1 over the sphere. [-]"""
+        raise NotImplementedError
+
+
+class Scatterer(eqx.Module):
+    """Scattering optical depth of each layer by one kind of particle, and its phase function."""
+
+    scattering: Float[Array, " layer"]
+    phase: PhaseFunction
+
+
+class OpticalProperties(eqx.Module):
+    """Optical properties of the layers of one column in one band.
+
+    Parameters
+    ----------
+    extinction
+        Extinction optical depth of each layer. [-]
+    weight
+        Weight of each exponential term, summing to 1. [-]
+    scatterers
+        What scatters in it, one entry for each kind of particle.
+    """
+
+    extinction: Float[Array, "term layer"]
+    weight: Float[Array, " term"]
+    scatterers: tuple[Scatterer, ...]
+
+    def __add__(self, other: Self) -> Self:
+        """Mix two sets of optical properties.
+
+        Raises
+        ------
+        ValueError
+            Where both have several exponential terms: only gases do, and the producer of gas
+            absorption is the one that knows how its sums combine.
+        """
+        if min(self.weight.shape[0], other.weight.shape[0]) > 1:
+            raise ValueError(
+                "only one of two mixed OpticalProperties may have several exponential terms; got "
+                f"{self.weight.shape[0]} and {other.weight.shape[0]}."
+            )
+        weight = self.weight if self.weight.shape[0] > 1 else other.weight
+        extinction = self.extinction + other.extinction
+        return type(self)(extinction, weight, self.scatterers + other.scatterers)
+
+    @property
+    def tau(self) -> Float[Array, "term layer"]:
+        """Extinction optical depth of each layer. [-]"""
+        return self.extinction
+
+    @property
+    def scattering(self) -> Float[Array, " layer"]:
+        """Scattering optical depth of each layer. [-]"""
+        return sum((s.scattering for s in self.scatterers), jnp.zeros_like(self.extinction[0]))
+
+    @property
+    def ssa(self) -> Float[Array, "term layer"]:
+        """Single-scattering albedo, 0 in an empty layer. [-]"""
+        return safe_divide(self.scattering, self.extinction)
+
+    def moments(self, num_moments: int) -> Float[Array, "layer moment"]:
+        """Legendre moments of the mixture, weighted by scattering; 1, 0, 0, ... where none. [-]"""
+        scattering = self.scattering
+        mixed = sum(
+            (s.scattering[:, None] * s.phase.moments(num_moments)[:, 1:] for s in self.scatterers),
+            jnp.zeros((scattering.shape[0], num_moments - 1), scattering.dtype),
+        )
+        higher = safe_divide(mixed, scattering[:, None])
+        return jnp.concatenate([jnp.ones_like(scattering)[:, None], higher], axis=1)
+
+    def phase_function(self, cos_scattering: Float[Array, ""]) -> Float[Array, " layer"]:
+        """Phase function of the mixture, weighted by scattering; 0 where nothing scatters. [-]"""
+        scattering = self.scattering
+        mixed = sum(
+            (s.scattering * s.phase(cos_scattering) for s in self.scatterers),
+            jnp.zeros_like(scattering),
+        )
+        return safe_divide(mixed, scattering)
