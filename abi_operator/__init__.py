@@ -1,0 +1,20 @@
+"""Differentiable synthetic imagery of the GOES-R Advanced Baseline Imager.
+
+With this package you write down what a column of the atmosphere holds (`State`: air, droplets,
+smoke, ash, a ground, a sun and a satellite) and get the reflectance that the imager would see in
+each band, `reflectance_factor` or `brf`, with exact derivatives by `jax.jacfwd`, `jax.jacrev` and
+`jax.grad` with respect to everything in the state. `abi_operator.solver` is the radiative transfer
+on its own; `abi_operator.files` and `abi_operator.scene` turn model output on disk into images.
+"""
+
+from ._version import __version__ as __version__
+from .atmosphere import Atmosphere as Atmosphere
+from .atmosphere import LiquidCloud as LiquidCloud
+from .atmosphere import Plume as Plume
+from .atmosphere import State as State
+from .bands import BANDS as BANDS
+from .geometry import Geometry as Geometry
+from .optics import ash as ash
+from .optics import smoke as smoke
+from .reflectance import brf as brf
+from .reflectance import reflectance_factor as reflectance_factor

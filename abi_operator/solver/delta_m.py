@@ -1,0 +1,61 @@
+"""delta-M scaling of sharp forward peaks."""
+
+from typing import NamedTuple
+
+from jaxtyping import Array, Float
+
+
+class ScaledLayers(NamedTuple):
+    """Layers whose forward peak is counted as unscattered; see `delta_m`.
+
+    `coalbedo` is 1 - ssa, formed directly; `scattering_ratio` is omega / (1 - omega f) of the
+    unscaled albedo, by which the exact single scattering is weighted.
+    """
+
+    tau: Float[Array, "layer *batch"]
+    ssa: Float[Array, "layer *batch"]
+    coalbedo: Float[Array, "layer *batch"]
+    moments: Float[Array, "layer moment *batch"]
+    scattering_ratio: Float[Array, "layer *batch"]
+
+
+def delta_m(
+    tau: Float[Array, "layer *batch"],
+    ssa: Float[Array, "layer *batch"],
+    moments: Float[Array, "layer moment *batch"],
+    num_streams: int,
+) -> ScaledLayers:
+    r"""Scale away the forward peak that `num_streams` streams cannot resolve.
+
+    With f = chi_N and N = `num_streams`: :math:`\tau' = (1-\omega f)\tau`,
+    :math:`\omega' = (1-f)\omega/(1-\omega f)`, :math:`\chi'_l = (\chi_l - f)/(1-f)` for l < N.
+    Absorption, tau (1 - omega), is unchanged.
+
+    Parameters
+    ----------
+    tau, ssa
+        Extinction optical depth and single-scattering albedo of each layer. [-]
+    moments, num_streams
+        Legendre moments, chi_0 = 1, without the factor 2l + 1; at least N + 1 of them. [-]
+
+    References
+    ----------
+    .. [1] W. J. Wiscombe, "The delta-M method", J. Atmos. Sci., 34, 1408-1422, 1977,
+       doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2
+    """
+    f = moments[:, num_streams]
+    rest = 1 - ssa * f
+    scaled = (moments[:, :num_streams] - f[:, None]) / (1 - f[:, None])
+    return ScaledLayers(
+        rest * tau, ssa * (1 - f) / rest, (1 - ssa) / rest, scaled, ssa / rest
+    )
+
+
+def unscaled(
+    tau: Float[Array, "layer *batch"],
+    ssa: Float[Array, "layer *batch"],
+    moments: Float[Array, "layer moment *batch"],
+    num_streams: int,
+) -> ScaledLayers:
+    """The same layers with f = 0, for a calculation without delta-M."""
+    return ScaledLayers(tau, ssa, 1 - ssa, moments[:, :num_streams], ssa)

@@ -1,0 +1,147 @@
+r"""One homogeneous layer and one azimuth mode, without eigenvalues.
+
+With s = up + down and t = up - down, the discrete-ordinate equations of a layer are
+
+.. math::
+   dt/d\tau = A s, \quad A = M^{-1}(1 - P_e W), \qquad ds/d\tau = B t, \quad B = M^{-1}(1 - P_o W),
+
+where P_e keeps the degrees with even l + m and P_o the odd ones. A layer of thickness tau = 2h acts
+through the admittance Y and the impedance of its half,
+
+.. math::
+   Y = hA\,\varphi(h^2BA), \qquad Z = \varphi(h^2BA)^{-1} B^{-1}, \qquad
+   \varphi(x) = \tanh(\sqrt x)/\sqrt x .
+
+phi is even in the square root, hence smooth: there is nothing to diagonalise, nothing special about
+ssa = 1 (a zero eigenvalue), and every derivative exists. A rational phi serves thin layers; a thick
+one starts from its 2^K-th part and doubles K times by the addition theorem of tanh. Nothing is
+divided by h, so that empty layers need no care.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._numerics import matmul
+from .bordered import Bordered, between
+from .legendre import associated_legendre
+from .quadrature import double_gauss
+
+
+class ModeKernels(eqx.Module):
+    """Legendre functions from which one azimuth mode builds A or B of every layer.
+
+    Only degrees of one parity are present: those with even l + m build A, the others build B.
+    Nodes carry the factor sqrt(w / mu).
+
+    Parameters
+    ----------
+    pairs
+        Products for two nodes.
+    nodes
+        Functions at the nodes.
+    borders
+        Functions at mu0 (first row) and mu (second).
+    """
+
+    pairs: Float[Array, "node node degree"]
+    nodes: Float[Array, "node degree"]
+    borders: Float[Array, "2 degree *batch"]
+
+
+def node_functions(num_streams: int, num_modes: int) -> np.ndarray:
+    """Legendre functions of the nodes times sqrt(w / mu), axes ``mode degree node``, float64."""
+    mu, weight = double_gauss(num_streams)
+    return associated_legendre(num_modes, num_streams, mu) * np.sqrt(weight / mu)
+
+
+def layer_matrix(
+    kernels: ModeKernels,
+    moments: Float[Array, "degree *batch"],
+    secants: Float[Array, "2 *batch"],
+    single_scattering: bool,
+) -> Bordered:
+    r"""Build A (or B) of one layer from the moments of its parity.
+
+    Parameters
+    ----------
+    kernels
+        Legendre functions of the degrees of this parity.
+    moments
+        :math:`\omega(2l+1)\chi_l` of the same degrees.
+    secants
+        1 / mu0 and 1 / mu.
+    single_scattering
+        Whether sun -> view is scattered here; False where single scattering is added exactly.
+    """
+    num_nodes = kernels.nodes.shape[0]
+    mu = jnp.asarray(double_gauss(2 * num_nodes)[0], moments.dtype)
+    inverse_mu = jnp.diag(1 / mu).reshape(num_nodes, num_nodes, *(1,) * (moments.ndim - 1))
+    core = inverse_mu - jnp.tensordot(kernels.pairs, moments, axes=1)
+    weighted = jnp.swapaxes(moments * kernels.borders, 0, 1)
+    border = -jnp.tensordot(kernels.nodes, weighted, axes=1)
+    corner = jnp.zeros_like(secants[0])
+    if single_scattering:
+        corner = -jnp.sum(moments * kernels.borders[0] * kernels.borders[1], axis=0)
+    return Bordered(core, border, secants, corner)
+
+
+def conservative(matrix: Bordered, coalbedo: Float[Array, "*batch"]) -> Bordered:
+    r"""Rebuild the diagonal of A's core in mode 0 from the co-albedo.
+
+    The quadrature integrates the phase function exactly, so that the core's rows, weighted by
+    :math:`s = \sqrt{w\mu}`, sum to :math:`(1-\omega)s/\mu`. Forming the diagonal as that sum
+    minus the other entries keeps a co-albedo far below the rounding error of 1 - ssa P.
+    """
+    num_nodes = matrix.core.shape[0]
+    mu, weight = double_gauss(2 * num_nodes)
+    expand = (num_nodes,) + (1,) * coalbedo.ndim
+    s = jnp.asarray(np.sqrt(weight * mu), coalbedo.dtype).reshape(expand)
+    diagonal = jnp.eye(num_nodes, dtype=bool).reshape(*expand[:1], *expand)
+    others = jnp.where(diagonal, 0, matrix.core)
+    row_sum = coalbedo / jnp.asarray(mu, coalbedo.dtype).reshape(expand)
+    entry = row_sum - matmul(others, s[:, None])[:, 0] / s
+    core = jnp.where(diagonal, entry[:, None], matrix.core)
+    return eqx.tree_at(lambda m: m.core, matrix, core)
+
+
+def half_layer(
+    a: Bordered, b: Bordered, tau: Float[Array, "*batch"], num_doublings: int
+) -> tuple[Bordered, Bordered]:
+    r"""Admittance Y and h-fold impedance Z of half a layer of optical depth `tau`.
+
+    The start uses the continued fraction of :math:`\sqrt x\coth\sqrt x` down to 9,
+
+    .. math::
+       \varphi(x)^{-1} = 1 + x/(3 + x/(5 + x/(7 + x/9))) =
+       \frac{945 + 420x + 15x^2}{945 + 105x + x^2},
+
+    read from the inside with x = h^2 B A as matrices that stay symmetric: a term a/t with
+    t = k + x/t' is A/k - (h/k)^2 A (t'/b + h^2 A/k)^{-1} A. Doubling is
+
+    .. math:: Z_{2h} = Z_h + h Y_h, \qquad Y_{2h} = 2 (Y_h - h Y_h Z_{2h}^{-1} Y_h).
+
+    Returns
+    -------
+    Y (tanh) and Z = h coth in the same units, with h = tau / 2.
+    """
+    h = tau * (0.5 / 2**num_doublings)
+    square = h * h
+    b_inverse = b.inverse()
+    inner = (1 / 7) * a - (square / 49) * between(a, 9.0 * b_inverse + (square / 7) * a, a)
+    inner = 5.0 * b_inverse + square * ((1 / 3) * a + inner)
+    fraction = (1 / 3) * a - (square / 9) * between(a, inner, a)
+    impedance = b_inverse + square * fraction
+    admittance = h * a - (h * square) * between(a, impedance, fraction)
+
+    def double(carry, _):
+        admittance, impedance, h = carry
+        impedance = impedance + h * admittance
+        admittance = 2.0 * (admittance - h * between(admittance, impedance, admittance))
+        return (admittance, impedance, 2 * h), None
+
+    carry = (admittance, impedance, h)
+    (admittance, impedance, _), _ = jax.lax.scan(double, carry, length=num_doublings)
+    return admittance, impedance
