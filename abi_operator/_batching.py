@@ -19,9 +19,7 @@ def tile_size(num_streams: int) -> int:
     return 128 if num_streams <= 8 else 64 if num_streams <= 16 else 16
 
 
-def map_tiles(
-    function: Callable[..., Array], arrays: tuple[Array, ...], tile: int
-) -> Array:
+def map_tiles(function: Callable[..., Array], arrays: tuple[Array, ...], tile: int) -> Array:
     """Apply a batch-last `function` to its arrays tile by tile.
 
     Parameters
@@ -41,7 +39,9 @@ def map_tiles(
 
     def tiled(x: Array) -> Array:
         padding = [(0, 0)] * (x.ndim - 1) + [(0, count * tile - size)]
-        return jnp.moveaxis(jnp.pad(x, padding, mode="edge").reshape(*x.shape[:-1], count, tile), -2, 0)
+        return jnp.moveaxis(
+            jnp.pad(x, padding, mode="edge").reshape(*x.shape[:-1], count, tile), -2, 0
+        )
 
     result = jax.lax.map(lambda xs: function(*xs), tuple(tiled(x) for x in arrays))
     return jnp.moveaxis(result, 0, -2).reshape(*result.shape[1:-1], count * tile)[..., :size]

@@ -54,9 +54,9 @@ def multiple_scattering(
     functions = []
     for parity in (0, 1):
         # Entry m of these holds the degrees with l + m even (parity 0) or odd.
-        node = jnp.stack([
-            jnp.asarray(nodes[m, (m + parity) % 2 :: 2].T, dtype) for m in range(num_modes)
-        ])
+        node = jnp.stack(
+            [jnp.asarray(nodes[m, (m + parity) % 2 :: 2].T, dtype) for m in range(num_modes)]
+        )
         border = jnp.stack([borders[m, (m + parity) % 2 :: 2] for m in range(num_modes)])
         functions.append((node, jnp.swapaxes(border, 1, 2)))
 

@@ -46,9 +46,7 @@ def delta_m(
     f = moments[:, num_streams]
     rest = 1 - ssa * f
     scaled = (moments[:, :num_streams] - f[:, None]) / (1 - f[:, None])
-    return ScaledLayers(
-        rest * tau, ssa * (1 - f) / rest, (1 - ssa) / rest, scaled, ssa / rest
-    )
+    return ScaledLayers(rest * tau, ssa * (1 - f) / rest, (1 - ssa) / rest, scaled, ssa / rest)
 
 
 def unscaled(

@@ -84,6 +84,8 @@ def toa_brf(
         arrays.append(phase_function)
     arrays = _promoted(arrays)
     _check(arrays, num_streams, num_modes, delta_m, single_scattering)
+    if num_doublings is not None and num_doublings < 0:
+        raise ValueError(f"num_doublings must be 0 or more; got {num_doublings}.")
     if num_doublings is None:
         num_doublings = _doublings(arrays, num_streams)
     return _solve(
@@ -149,7 +151,9 @@ def _doublings(arrays: list, num_streams: int) -> int:
     return sufficient_doublings(float(np.max(tau)), min_mu, num_streams)
 
 
-@partial(jax.jit, static_argnames=("num_streams", "num_modes", "use_delta_m", "tms", "num_doublings"))
+@partial(
+    jax.jit, static_argnames=("num_streams", "num_modes", "use_delta_m", "tms", "num_doublings")
+)
 def _solve(
     tau,
     ssa,

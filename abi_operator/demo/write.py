@@ -1,0 +1,61 @@
+"""Write the inputs of the demonstration's scene."""
+
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from PIL import Image
+
+from .air import make_air, with_hydrostatic_height
+from .albedo_file import write_albedo
+from .clouds import cloud_mixing_ratio, make_clouds, make_weather, saturate
+from .grid import make_grid
+from .landscape import make_landscape
+from .plume_picture import plume_brightness
+from .wrf_file import FILE_NAME, write_wrf
+
+
+class DemoInputs(NamedTuple):
+    """The files of a demonstration: model output, MODIS albedo and a picture of the smoke."""
+
+    wrf: Path
+    albedo: Path
+    plume: Path
+
+
+def write_demo(folder: str | PathLike[str], *, size: int = 64, seed: int = 0) -> DemoInputs:
+    """Write model output, albedo and a plume picture of a smoky Californian coast.
+
+    The scene is 256 km wide around 33.5 N 117.5 W, on 23 October 2007 at 18 UTC.
+
+    Parameters
+    ----------
+    folder
+        Where to write, made if need be.
+    size
+        Rows and columns of the scene, 8 or more. [-]
+    seed
+        Another seed is another coast with other clouds and other smoke. [-]
+    """
+    if size < 8:
+        raise ValueError(f"a demonstration has 8 rows and columns or more; got {size=}.")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = DemoInputs(folder / FILE_NAME, folder / "albedo.nc", folder / "plume.png")
+    land_rng, cloud_rng, smoke_rng = np.random.default_rng(seed).spawn(3)
+    landscape = make_landscape(land_rng)
+    grid = make_grid(size)
+    distance = landscape.coast_distance(grid.east, grid.north)
+    terrain = landscape.terrain(grid.east, grid.north, distance)
+    marine = 1 / (1 + np.exp(np.clip(distance / 8e3, -50, 50)))
+    clear = make_air(terrain, marine)
+    clouds = make_clouds(make_weather(cloud_rng), grid, distance, terrain)
+    cloud_water = cloud_mixing_ratio(clouds, clear)
+    air = with_hydrostatic_height(saturate(clear, cloud_water), terrain, cloud_water)
+    write_wrf(paths.wrf, grid, air, cloud_water, terrain, distance > 0)
+    write_albedo(paths.albedo, landscape, grid.spacing)
+    brightness = plume_brightness(smoke_rng, grid)
+    picture = np.flipud(np.rint(255 * brightness).astype(np.uint8))
+    Image.fromarray(picture).save(paths.plume)
+    return paths

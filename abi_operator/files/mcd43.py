@@ -1,0 +1,192 @@
+"""MODIS albedo, MCD43A1, as the AppEEARS service of the LP DAAC delivers it in NetCDF."""
+
+import warnings
+from collections.abc import Sequence
+
+import netCDF4
+import numpy as np
+import xarray as xr
+
+from ..bands import check_bands
+from .errors import InputError
+from .modis_bands import BROADBAND_STAND_IN, MODIS_TO_ABI, WHITE_SKY, AlbedoRegression
+from .netcdf import FilePath, cf_attributes, load, open_netcdf, require_dims, require_variables
+
+VARIABLE_MAP = {
+    "BRDF_Albedo_Parameters_": "surface_albedo",
+    "BRDF_Albedo_Band_Mandatory_Quality_": "albedo_quality",
+}
+"""Beginning of a variable's name in the file, before the MODIS band: ours."""
+
+_PARAMETERS, _QUALITY = VARIABLE_MAP
+_GRID = ("time", "lat", "lon")
+_NO_INVERSION = 255
+
+
+def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = False) -> xr.Dataset:
+    """Read white-sky albedo in bands of ABI from an AppEEARS file of MCD43A1.
+
+    White-sky albedo of a MODIS band is f_iso + 0.189184 f_vol - 1.377622 f_geo; that of an ABI
+    band is a regression on one or two of them, `modis_bands.MODIS_TO_ABI`.
+
+    Parameters
+    ----------
+    path
+        The file.
+    bands
+        Bands of ABI, such as ``"C01"``.
+    broadband
+        Whether a broadband (vis, nir) may stand in for spectral bands that the file lacks; each
+        such band is warned of.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``surface_albedo`` (band, time, lat, lon) [-], NaN where the file has none; attributes
+        count valid inversions that were made NaN because their albedo lies outside 0..1
+        (``num_outside_unit_interval``), and kernel weights outside the file's valid range
+        (``num_outside_valid_range``). ``albedo_quality``, same dimensions, uint8: the worst
+        mandatory quality among the MODIS bands used; 0 full inversion, 1 magnitude inversion, 255
+        none. The order of ``lat`` is the file's.
+    """
+    bands = check_bands(bands)
+    with open_netcdf(path) as file:
+        regressions = _choose_regressions(file, bands, broadband, path)
+        used = dict.fromkeys(name for r in regressions for name in r.weights)
+        require_variables(
+            file,
+            ["time", "lat", "lon", *(_QUALITY + name for name in used)],
+            path,
+            "request the area from AppEEARS in NetCDF format, with its quality layers",
+        )
+        grid = {name: _axis(file, name, path) for name in ("lat", "lon")}
+        time = ("time", _times(file, path), {"standard_name": "time"})
+        white_sky, quality, num_invalid = {}, {}, 0
+        for name in used:
+            white_sky[name], invalid = _white_sky_albedo(file, name, path)
+            quality[name] = _quality(file, name, path)
+            num_invalid += invalid
+    albedo = np.stack(
+        [r.offset + sum(w * white_sky[n] for n, w in r.weights.items()) for r in regressions]
+    )
+    worst = np.stack([np.maximum.reduce([quality[n] for n in r.weights]) for r in regressions])
+    outside = (albedo < 0) | (albedo > 1)
+    albedo[outside] = np.nan
+    albedo_attributes = cf_attributes("surface_albedo") | {
+        "num_outside_unit_interval": int(outside.sum()),
+        "num_outside_valid_range": num_invalid,
+        "comment": "; ".join(
+            f"{band} from {' and '.join(r.weights)}"
+            for band, r in zip(bands, regressions, strict=True)
+        ),
+    }
+    quality_attributes = {
+        "long_name": "worst mandatory quality of the MODIS bands used",
+        "flag_values": np.array([0, 1, _NO_INVERSION], np.uint8),
+        "flag_meanings": "full_inversion magnitude_inversion no_inversion",
+    }
+    return xr.Dataset(
+        {
+            "surface_albedo": (("band", *_GRID), albedo, albedo_attributes),
+            "albedo_quality": (("band", *_GRID), worst, quality_attributes),
+        },
+        coords={"band": list(bands), "time": time, **grid},
+        attrs={key: file.attrs[key] for key in ("title", "source") if key in file.attrs},
+    )
+
+
+def _choose_regressions(
+    file: xr.Dataset, bands: tuple[str, ...], broadband: bool, path: FilePath
+) -> list[AlbedoRegression]:
+    """For each ABI band its regression on MODIS bands, or a broadband in their stead."""
+    chosen, lacking, remedy = [], [], ""
+    for band in bands:
+        regression = MODIS_TO_ABI[band]
+        missing = [name for name in regression.weights if _PARAMETERS + name not in file]
+        stand_in = BROADBAND_STAND_IN.get(band)
+        if missing and broadband and stand_in is not None and _PARAMETERS + stand_in in file:
+            warnings.warn(
+                f"{path} has no {_PARAMETERS}{missing[0]}; the albedo of {band} is that of the "
+                f"broadband {stand_in}.",
+                UserWarning,
+                stacklevel=3,
+            )
+            regression = AlbedoRegression({stand_in: 1.0}, 0.0)
+        else:
+            lacking += missing
+            if missing and stand_in is not None and not broadband:
+                remedy = ", or allow broadband albedo to stand in for C01, C02 and C03"
+        chosen.append(regression)
+    if lacking:
+        raise InputError(
+            f"{path} has no {', '.join(_PARAMETERS + name for name in lacking)}; request these "
+            f"layers of MCD43A1 from AppEEARS{remedy}."
+        )
+    return chosen
+
+
+def _white_sky_albedo(file: xr.Dataset, name: str, path: FilePath) -> tuple[np.ndarray, int]:
+    """White-sky albedo of a MODIS band, and how many kernel weights were out of range."""
+    parameters = file[_PARAMETERS + name]
+    require_dims(parameters, (*_GRID, "Num_Parameters"), path)
+    if parameters.sizes["Num_Parameters"] != len(WHITE_SKY):
+        raise InputError(
+            f"{parameters.name} in {path} has {parameters.sizes['Num_Parameters']} kernel weights "
+            f"where {len(WHITE_SKY)} are expected; request MCD43A1 from AppEEARS."
+        )
+    packed = np.issubdtype(parameters.encoding.get("dtype", np.float64), np.integer)
+    if packed and "scale_factor" not in parameters.encoding:
+        raise InputError(
+            f"{parameters.name} in {path} has no scale_factor; give the file as AppEEARS wrote it."
+        )
+    values = load(parameters, path)
+    invalid = _outside_valid_range(values, parameters)
+    values[invalid] = np.nan
+    return values @ np.array(WHITE_SKY), int(invalid.sum())
+
+
+def _outside_valid_range(values: np.ndarray, array: xr.DataArray) -> np.ndarray:
+    """Where unpacked values lie outside the range that the file states for packed ones."""
+    scale = float(array.encoding.get("scale_factor", 1.0))
+    offset = float(array.encoding.get("add_offset", 0.0))
+    tolerance = 0.5 * scale  # half a count: packed values are whole
+    lowest = float(array.attrs.get("valid_min", -np.inf)) * scale + offset - tolerance
+    highest = float(array.attrs.get("valid_max", np.inf)) * scale + offset + tolerance
+    return (values < lowest) | (values > highest)
+
+
+def _quality(file: xr.Dataset, name: str, path: FilePath) -> np.ndarray:
+    """Mandatory quality of a MODIS band, 255 where there is none."""
+    quality = file[_QUALITY + name]
+    require_dims(quality, _GRID, path)
+    return np.nan_to_num(load(quality, path), nan=_NO_INVERSION).astype(np.uint8)
+
+
+def _axis(file: xr.Dataset, name: str, path: FilePath) -> xr.DataArray:
+    """Latitude or longitude of the grid: finite and monotonic."""
+    axis = file[name]
+    require_dims(axis, (name,), path)
+    values = load(axis, path)
+    steps = np.diff(values)
+    if not np.isfinite(values).all() or not ((steps > 0).all() or (steps < 0).all()):
+        raise InputError(f"{name} in {path} is not monotonic; give the file as AppEEARS wrote it.")
+    ours = {"lat": "latitude", "lon": "longitude"}[name]
+    return xr.DataArray(values, dims=(name,), attrs=cf_attributes(ours))
+
+
+def _times(file: xr.Dataset, path: FilePath) -> np.ndarray:
+    """Dates of a file; AppEEARS counts days in the julian calendar and means the usual one."""
+    time = file["time"]
+    require_dims(time, ("time",), path)
+    try:
+        dates = netCDF4.num2date(
+            time.values, time.attrs["units"], time.attrs.get("calendar", "standard")
+        )
+    except (KeyError, ValueError) as error:
+        raise InputError(
+            f"time in {path} cannot be read as dates ({error}); give the file as AppEEARS wrote it."
+        ) from error
+    texts = [
+        f"{date.year:04d}-{date.month:02d}-{date.day:02d}" for date in np.asarray(dates, object)
+    ]
+    return np.array(texts, dtype="datetime64[ns]")

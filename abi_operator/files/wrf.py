@@ -1,0 +1,256 @@
+"""Output of the WRF-ARW model, read one time and one block of rows at a time.
+
+WRF counts levels from the ground up and splits pressure and geopotential into a base state and a
+perturbation; the **model Dataset** returned here counts from the top down and has their sums.
+"""
+
+import numpy as np
+import xarray as xr
+
+from ..constants import GRAVITY, KAPPA
+from ..nomenclature import MODEL
+from .errors import InputError
+from .netcdf import (
+    FilePath,
+    cf_attributes,
+    load_finite,
+    open_netcdf,
+    require_dims,
+    require_variables,
+)
+
+VARIABLE_MAP = {
+    "XLAT": "latitude",
+    "XLONG": "longitude",
+    "P": "layer_pressure",  # perturbation of
+    "PB": "layer_pressure",  # the base state
+    "PH": "height",  # perturbation of
+    "PHB": "height",  # the base state's geopotential
+    "T": "temperature",  # potential temperature less 300 K
+    "PSFC": "surface_pressure",
+    "QVAPOR": "vapour_mixing_ratio",
+    "QCLOUD": "cloud_mixing_ratio",
+    "QRAIN": "rain_mixing_ratio",
+    "QICE": "ice_mixing_ratio",
+    "QSNOW": "snow_mixing_ratio",
+    "QGRAUP": "graupel_mixing_ratio",
+    "QHAIL": "hail_mixing_ratio",
+    "QNDROP": "cloud_number_mixing_ratio",  # NSSL schemes
+    "QNCLOUD": "cloud_number_mixing_ratio",  # all others
+    "XLAND": "land_mask",  # 1 land, 2 water
+    "LANDMASK": "land_mask",  # 1 land, 0 water
+}
+"""WRF's name of a variable: ours. Of two that are alternatives the latter is preferred."""
+
+REQUIRED = ("P", "PB", "PH", "PHB", "T", "QVAPOR", "QCLOUD", "XLAT", "XLONG")
+
+DIMENSIONS = {
+    "bottom_top": "layer",
+    "bottom_top_stag": "level",
+    "south_north": "y",
+    "west_east": "x",
+}
+
+# Potential temperature is stored less this, whatever the file's T00. [K]
+_THETA_OFFSET = 300.0
+# Pressure at which temperature and potential temperature agree. [Pa]
+_THETA_PRESSURE = 1.0e5
+
+_ADVICE = "give a WRF output file (wrfout_*) that holds them"
+
+
+def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
+    """Read when and where the columns of a WRF file are, and check that it has what we need.
+
+    Parameters
+    ----------
+    path
+        A wrfout file.
+    time
+        Index of the time whose positions to return; it matters where a nest moves. [-]
+
+    Returns
+    -------
+    xarray.Dataset
+        Coordinates ``time``, of the whole file, and ``latitude`` and ``longitude`` (y, x)
+        [degree]; ``land_mask`` if the file has one. Attributes ``title``,
+        ``microphysics_scheme`` (WRF's number), ``bottom_top_levels_of_run`` (layers of the run,
+        of which the file may hold fewer) and ``moving_nest`` (1 where positions differ from time
+        to time, else 0).
+    """
+    with open_netcdf(path) as file:
+        require_variables(file, REQUIRED, path, _ADVICE)
+        times = _times(file, path)
+        place = {"time": time, "rows": slice(None), "path": path}
+        dataset = xr.Dataset(
+            coords={
+                "time": ("time", times, {"standard_name": "time", "long_name": "time"}),
+                "latitude": _field(file, "XLAT", **place),
+                "longitude": _field(file, "XLONG", **place),
+            },
+            attrs=_attributes(file) | {"moving_nest": int(_moves(file))},
+        )
+        land_mask = _land_mask(file, **place)
+        return dataset if land_mask is None else dataset.assign(land_mask=land_mask)
+
+
+def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset:
+    """Read one time and a block of rows of a WRF file; nothing else is read from disk.
+
+    Pressure is P + PB, temperature (T + 300) (p / 1e5 Pa)^(2/7), with T and not the moist THM,
+    and height (PH + PHB) / 9.81. Water of each kind is per mass of dry air. Advection leaves tiny
+    negative amounts; they are set to zero, and the variable's attribute
+    ``num_negative_set_to_zero`` tells how many there were.
+
+    Parameters
+    ----------
+    path
+        A wrfout file.
+    time
+        Index of the time, from 0. [-]
+    rows
+        The rows ``y`` to read, counted from the south. [-]
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of `abi_operator.nomenclature.MODEL`, float64, dimensions ``layer y x`` and
+        ``level y x``, top first, with the scalar coordinate ``time``.
+    """
+    with open_netcdf(path) as file:
+        require_variables(file, REQUIRED, path, _ADVICE)
+        times = _times(file, path)
+        place = {"time": time, "rows": rows, "path": path}
+        pressure = _field(file, "P", **place) + _field(file, "PB", **place)
+        theta = _field(file, "T", **place) + _THETA_OFFSET
+        fields = {
+            "layer_pressure": pressure,
+            "temperature": theta * (pressure / _THETA_PRESSURE) ** KAPPA,
+            "height": (_field(file, "PH", **place) + _field(file, "PHB", **place)) / GRAVITY,
+        }
+        for name, ours in VARIABLE_MAP.items():
+            if name in file and (ours == "surface_pressure" or ours.endswith("mixing_ratio")):
+                fields[ours] = _field(file, name, **place)
+        land_mask = _land_mask(file, **place)
+        if land_mask is not None:
+            fields["land_mask"] = land_mask
+        coords = {
+            "time": times[time],
+            "latitude": _field(file, "XLAT", **place),
+            "longitude": _field(file, "XLONG", **place),
+        }
+        attributes = _attributes(file)
+    dataset = xr.Dataset({n: _finish(f, n) for n, f in fields.items()}, coords, attributes)
+    _check_columns(dataset, path)
+    return dataset
+
+
+def _field(file: xr.Dataset, name: str, *, time: int, rows: slice, path: FilePath) -> xr.DataArray:
+    """One of WRF's variables in our dimensions, top first."""
+    num_times = file.sizes.get("Time", 0)
+    if not 0 <= time < num_times:
+        raise InputError(f"{path} has {num_times} times; ask for one of them, from 0, not {time}.")
+    array = file[name]
+    ours = VARIABLE_MAP[name]
+    dims = MODEL[ours].dims
+    fixed = "Time" not in array.dims and dims == ("y", "x")  # written once for all times
+    theirs = tuple(theirs for dim in dims for theirs, own in DIMENSIONS.items() if own == dim)
+    require_dims(array, theirs if fixed else ("Time", *theirs), path)
+    block = array.isel(south_north=rows) if fixed else array.isel(Time=time, south_north=rows)
+    values = load_finite(block, path)
+    if len(dims) == 3:
+        values = values[::-1]
+    return xr.DataArray(values, dims=dims, attrs=cf_attributes(ours))
+
+
+def _land_mask(file: xr.Dataset, *, time: int, rows: slice, path: FilePath) -> xr.DataArray | None:
+    """1 over land, 0 over water; None where the file does not say."""
+    for name in ("LANDMASK", "XLAND"):
+        if name in file:
+            values = _field(file, name, time=time, rows=rows, path=path)
+            return (values == 1).astype(np.float64).assign_attrs(cf_attributes("land_mask"))
+    return None
+
+
+def _finish(array: xr.DataArray, name: str) -> xr.DataArray:
+    """Give a variable its attributes, and a mixing ratio no negative values."""
+    array = array.assign_attrs(cf_attributes(name))
+    if name.endswith("mixing_ratio"):
+        num_negative = int((array < 0).sum())
+        array = array.clip(min=0).assign_attrs(array.attrs, num_negative_set_to_zero=num_negative)
+    return array
+
+
+def _check_columns(dataset: xr.Dataset, path: FilePath) -> None:
+    """Refuse columns whose pressure or height does not run from the top to the ground."""
+    pressure, height = dataset["layer_pressure"].values, dataset["height"].values
+    num_layers, num_levels = len(pressure), len(height)
+    if num_levels != num_layers + 1:
+        raise InputError(
+            f"{path} has {num_layers} layers and {num_levels} staggered levels, which should be "
+            "one more; cut levels out of bottom_top and bottom_top_stag alike."
+        )
+    if "surface_pressure" in dataset:
+        pressure = np.concatenate([pressure, dataset["surface_pressure"].values[None]])
+    bad = (pressure <= 0).any(axis=0) | (np.diff(pressure, axis=0) <= 0).any(axis=0)
+    if bad.any():
+        raise InputError(
+            f"P + PB in {path} does not fall monotonically with height, from PSFC down to a "
+            f"positive pressure, in {np.count_nonzero(bad)} of the {bad.size} columns read; "
+            "the operator needs columns in which it does."
+        )
+    thin = (np.diff(height, axis=0) >= 0).any(axis=0)
+    if thin.any():
+        raise InputError(
+            f"PH + PHB in {path} does not rise from level to level in {np.count_nonzero(thin)} of "
+            f"the {thin.size} columns read; the operator needs layers of positive thickness."
+        )
+
+
+def _times(file: xr.Dataset, path: FilePath) -> np.ndarray:
+    """The times of a file, from `Times` or, failing that, from minutes since the start."""
+    if "Times" in file:
+        texts = [
+            text.decode("latin-1") if isinstance(text, bytes) else str(text)
+            for text in np.atleast_1d(file["Times"].values)
+        ]
+        return np.array([_time(text, "Times", path) for text in texts])
+    start = file.attrs.get("SIMULATION_START_DATE", file.attrs.get("START_DATE"))
+    if "XTIME" not in file or start is None:
+        raise InputError(f"{path} has no Times, nor XTIME with SIMULATION_START_DATE; {_ADVICE}.")
+    minutes = load_finite(file["XTIME"], path)
+    seconds = np.rint(60 * np.atleast_1d(minutes)).astype("timedelta64[s]")
+    return _time(str(start), "SIMULATION_START_DATE", path) + seconds.astype("timedelta64[ns]")
+
+
+def _time(text: str, name: str, path: FilePath) -> np.datetime64:
+    """Parse WRF's way of writing a time, ``2007-10-23_18:00:00``."""
+    try:
+        return np.datetime64(text.strip("\0 ").replace("_", "T"), "ns")
+    except ValueError as error:
+        raise InputError(
+            f"{name} in {path} is {text!r}, which is no time; "
+            "it should be written as 2007-10-23_18:00:00."
+        ) from error
+
+
+def _moves(file: xr.Dataset) -> bool:
+    """Whether the grid is elsewhere at another time."""
+    corners = {"south_north": [0, -1], "west_east": [0, -1]}
+    return any(
+        "Time" in file[name].dims and bool(np.ptp(file[name].isel(corners).values, axis=0).any())
+        for name in ("XLAT", "XLONG")
+    )
+
+
+def _attributes(file: xr.Dataset) -> dict[str, str | int]:
+    """What later steps need to know of the run."""
+    attributes: dict[str, str | int] = {}
+    if "TITLE" in file.attrs:
+        attributes["title"] = str(file.attrs["TITLE"]).strip()
+    if "MP_PHYSICS" in file.attrs:
+        attributes["microphysics_scheme"] = int(file.attrs["MP_PHYSICS"])
+    if "BOTTOM-TOP_GRID_DIMENSION" in file.attrs:
+        num_levels = int(file.attrs["BOTTOM-TOP_GRID_DIMENSION"])
+        attributes["bottom_top_levels_of_run"] = num_levels - 1
+    return attributes

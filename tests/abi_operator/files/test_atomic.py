@@ -1,0 +1,76 @@
+"""Output that is there whole or not at all."""
+
+import os
+import tempfile
+
+import pytest
+
+from abi_operator.files import InputError, output_folder
+
+
+def test_files_appear_when_the_block_ends(tmp_path):
+    target = tmp_path / "deep" / "out"
+    with output_folder(target) as folder:
+        (folder / "a.nc").write_text("new")
+        (folder / "maps").mkdir()
+        (folder / "maps" / "b.png").write_text("map")
+        assert not target.exists()
+        assert folder.stat().st_dev == tmp_path.stat().st_dev
+    assert (target / "a.nc").read_text() == "new"
+    assert (target / "maps" / "b.png").read_text() == "map"
+    assert not folder.exists()
+
+
+def test_files_of_the_same_name_are_replaced_and_others_stay(tmp_path):
+    target = tmp_path / "out"
+    target.mkdir()
+    (target / "a").write_text("old")
+    (target / "b").write_text("old")
+    with output_folder(target) as folder:
+        (folder / "a").write_text("new")
+    assert {f.name: f.read_text() for f in target.iterdir()} == {"a": "new", "b": "old"}
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_nothing_is_left_after_an_error(tmp_path, error):
+    with pytest.raises(error), output_folder(tmp_path / "deep" / "out") as folder:
+        (folder / "a").write_text("half")
+        raise error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_the_way_is_named(tmp_path):
+    (tmp_path / "out").write_text("file")
+    for path in (tmp_path / "out", tmp_path / "out" / "run"):
+        with pytest.raises(InputError, match="out is a file where a folder is needed"):
+            with output_folder(path):
+                pass
+
+
+def test_a_folder_in_a_file_s_way_is_named_and_nothing_moved(tmp_path):
+    (tmp_path / "out" / "b").mkdir(parents=True)
+    with pytest.raises(InputError, match="b is a folder where a file is to be"):
+        with output_folder(tmp_path / "out") as folder:
+            (folder / "a").write_text("new")
+            (folder / "b").write_text("new")
+    assert not (tmp_path / "out" / "a").exists()
+
+
+def test_a_parent_that_cannot_be_written_to_is_named(tmp_path, monkeypatch):
+    def refuse(**_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(tempfile, "mkdtemp", refuse)  # root may write everywhere
+    with pytest.raises(InputError, match=r"cannot be written to \(Permission denied\)"):
+        with output_folder(tmp_path / "out"):
+            pass
+
+
+def test_a_relative_path_means_where_we_were(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with output_folder("out") as folder:
+        (folder / "a").write_text("new")
+        (tmp_path / "elsewhere").mkdir()
+        os.chdir(tmp_path / "elsewhere")
+    assert (tmp_path / "out" / "a").exists()

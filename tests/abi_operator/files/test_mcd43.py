@@ -1,0 +1,174 @@
+"""The albedo reader: kernels to white-sky albedo, MODIS bands to those of ABI, what is missing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from abi_operator.files import InputError, read_mcd43a1
+from abi_operator.files.modis_bands import MODIS_TO_ABI
+
+FILL = 32767
+# Rounding of sums of a few float64 numbers of order 1.
+ROUNDING = 1e-14
+
+
+def weights(f_iso, f_vol=0, f_geo=0, shape=(2, 2, 3)):
+    """Packed weights, the same everywhere."""
+    return np.broadcast_to(np.array([f_iso, f_vol, f_geo], np.int16), (*shape, 3)).copy()
+
+
+BANDS = {f"Band{n}": weights(100 * n, 50, 10) for n in (1, 2, 3, 6, 7)}
+
+
+def white_sky(f_iso, f_vol=0.05, f_geo=0.01):
+    return f_iso + 0.189184 * f_vol - 1.377622 * f_geo
+
+
+def test_albedo_is_white_sky_in_the_bands_of_abi(write_albedo_twin):
+    dataset = read_mcd43a1(write_albedo_twin(BANDS), ["C06", "C01", "C02", "C03"])
+    expected = {
+        "C01": 1.0057 * white_sky(0.3),
+        "C02": 0.983 * white_sky(0.1) + 0.0018,
+        "C03": 1.003 * white_sky(0.2) + 0.0009,
+        "C06": 0.897 * white_sky(0.7) + 0.0745 * white_sky(0.6) + 0.0033,
+    }
+    assert list(dataset["band"].values) == ["C06", "C01", "C02", "C03"]
+    albedo = dataset["surface_albedo"]
+    assert albedo.dims == ("band", "time", "lat", "lon")
+    assert albedo.dtype == np.float64
+    for band, value in expected.items():
+        np.testing.assert_allclose(albedo.sel(band=band), value, rtol=ROUNDING)
+
+
+def test_only_the_modis_bands_in_use_are_needed(write_albedo_twin):
+    path = write_albedo_twin({"Band3": BANDS["Band3"]})
+    assert read_mcd43a1(path, ["C01"]).sizes["band"] == 1
+
+
+def test_regressions_keep_a_grey_ground_nearly_grey():
+    for regression in MODIS_TO_ABI.values():
+        assert regression.offset + 0.3 * sum(regression.weights.values()) == pytest.approx(
+            0.3, abs=0.01
+        )
+
+
+def test_fill_becomes_nan_and_quality_255(write_albedo_twin):
+    packed = weights(300)
+    packed[1, 0, 2] = FILL
+    dataset = read_mcd43a1(write_albedo_twin({"Band3": packed}), ["C01"]).sel(band="C01")
+    missing = np.zeros((2, 2, 3), bool)
+    missing[1, 0, 2] = True
+    np.testing.assert_array_equal(np.isnan(dataset["surface_albedo"]), missing)
+    np.testing.assert_array_equal(dataset["albedo_quality"] == 255, missing)
+    assert dataset["surface_albedo"].attrs["num_outside_unit_interval"] == 0
+
+
+def test_quality_is_the_worst_of_the_bands_in_use(write_albedo_twin):
+    quality = {"Band6": np.array([0, 0, 1]), "Band7": np.array([0, 1, 255])}
+    quality = {band: np.broadcast_to(q, (2, 2, 3)) for band, q in quality.items()}
+    path = write_albedo_twin({b: BANDS[b] for b in ("Band6", "Band7")}, quality=quality)
+    flags = read_mcd43a1(path, ["C06"])["albedo_quality"]
+    assert flags.dtype == np.uint8
+    np.testing.assert_array_equal(flags[0, 0, 0], [0, 1, 255])
+
+
+def test_albedo_outside_0_to_1_is_made_nan_and_counted(write_albedo_twin):
+    packed = weights(300)
+    packed[0, 0, 0] = [10, 0, 100]  # -0.128
+    packed[0, 0, 1] = [990, 300, 0]  # 1.053
+    albedo = read_mcd43a1(write_albedo_twin({"Band3": packed}), ["C01"])["surface_albedo"]
+    assert np.isnan(albedo[0, 0, 0, :2]).all()
+    assert np.isnan(albedo).sum() == 2
+    assert albedo.attrs["num_outside_unit_interval"] == 2
+
+
+def test_weights_outside_the_valid_range_are_made_nan_and_counted(write_albedo_twin):
+    packed = weights(300)
+    packed[0, 1, 1, 1] = -3
+    albedo = read_mcd43a1(write_albedo_twin({"Band3": packed}), ["C01"])["surface_albedo"]
+    assert np.isnan(albedo).sum() == 1
+    assert albedo.attrs["num_outside_valid_range"] == 1
+
+
+@pytest.mark.parametrize("calendar", ["julian", "standard", "proleptic_gregorian"])
+def test_times_are_dates_whatever_the_calendar(write_albedo_twin, calendar):
+    path = write_albedo_twin({"Band3": BANDS["Band3"]}, calendar=calendar)
+    time = read_mcd43a1(path, ["C01"])["time"]
+    assert time.dtype == "datetime64[ns]"
+    np.testing.assert_array_equal(time, np.array(["2007-10-15", "2007-10-23"], "datetime64[ns]"))
+
+
+def test_missing_bands_are_named_and_the_remedy_too(write_albedo_twin):
+    path = write_albedo_twin({"vis": weights(100)})
+    message = (
+        "has no BRDF_Albedo_Parameters_Band3, BRDF_Albedo_Parameters_Band2; "
+        "request these layers of MCD43A1 from AppEEARS, or allow broadband"
+    )
+    with pytest.raises(InputError, match=message):
+        read_mcd43a1(path, ["C01", "C03"])
+
+
+def test_broadband_stands_in_with_a_warning(write_albedo_twin):
+    path = write_albedo_twin({"vis": weights(100), "nir": weights(300), "Band1": weights(150)})
+    with pytest.warns(UserWarning) as warned:
+        albedo = read_mcd43a1(path, ["C01", "C02", "C03"], broadband=True)["surface_albedo"]
+    assert [str(w.message).split("; ")[1] for w in warned] == [
+        "the albedo of C01 is that of the broadband vis.",
+        "the albedo of C03 is that of the broadband nir.",
+    ]
+    expected = [0.1, 0.983 * 0.15 + 0.0018, 0.3]
+    np.testing.assert_allclose(albedo[:, 0, 0, 0], expected, rtol=ROUNDING)
+
+
+def test_no_broadband_stands_in_for_c06(write_albedo_twin):
+    path = write_albedo_twin({"vis": weights(100), "nir": weights(300)})
+    with pytest.raises(InputError, match="Parameters_Band7, .*Parameters_Band6; request"):
+        read_mcd43a1(path, ["C06"], broadband=True)
+
+
+def test_a_band_that_is_not_simulated_is_refused(write_albedo_twin):
+    with pytest.raises(ValueError, match="C99"):
+        read_mcd43a1(write_albedo_twin(BANDS), ["C99"])
+
+
+def test_packed_weights_without_a_scale_are_refused(write_albedo_twin):
+    path = write_albedo_twin({"Band3": BANDS["Band3"]}, scale_factor=None)
+    with pytest.raises(InputError, match="Band3 in .* has no scale_factor"):
+        read_mcd43a1(path, ["C01"])
+
+
+def test_another_number_of_weights_is_refused(write_albedo_twin):
+    path = write_albedo_twin({"Band3": BANDS["Band3"][..., :2]})
+    with pytest.raises(InputError, match="has 2 kernel weights where 3 are expected"):
+        read_mcd43a1(path, ["C01"])
+
+
+def test_latitude_that_turns_back_is_refused(write_albedo_twin):
+    path = write_albedo_twin({"Band3": BANDS["Band3"]}, latitude=(34.0, 34.0))
+    with pytest.raises(InputError, match="lat in .* is not monotonic"):
+        read_mcd43a1(path, ["C01"])
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match="albedo.nc does not exist"):
+        read_mcd43a1(tmp_path / "albedo.nc", ["C01"])
+
+
+@pytest.mark.real
+def test_real_file_with_broadband_and_julian_days(sample_data: Path):
+    path = sample_data / "MCD43A1.006_aid0001.nc"
+    with pytest.raises(InputError, match="Parameters_Band3; request these layers"):
+        read_mcd43a1(path, ["C01"])
+    with pytest.warns(UserWarning, match="broadband"):
+        dataset = read_mcd43a1(path, ["C01", "C03"], broadband=True)
+    albedo = dataset["surface_albedo"]
+    assert albedo.shape == (2, 31, 48, 54)
+    assert dataset["time"].values[0] == np.datetime64("2001-01-01")
+    assert dataset["time"].values[-1] == np.datetime64("2001-01-31")
+    # Counts of fill and extremes of white-sky albedo, from the packed numbers with netCDF4.
+    np.testing.assert_array_equal(np.isnan(albedo).sum(("time", "lat", "lon")), [220, 639])
+    assert float(albedo.sel(band="C01").max()) == pytest.approx(0.113338566, rel=1e-8)
+    assert float(albedo.sel(band="C03").min()) == pytest.approx(0.005324288, rel=1e-6)
+    assert albedo.attrs["num_outside_unit_interval"] == 0
+    np.testing.assert_array_equal(dataset["albedo_quality"] == 255, np.isnan(albedo))

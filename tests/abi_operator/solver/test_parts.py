@@ -1,0 +1,124 @@
+"""The solver's parts on their own: quadrature, Legendre functions, bordered matrices, layers."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator._batching import map_tiles
+from abi_operator._numerics import inverse, matmul, safe_divide, safe_sqrt
+from abi_operator.solver import double_gauss, sufficient_doublings
+from abi_operator.solver.bordered import Bordered, between
+from abi_operator.solver.layer import half_layer
+from abi_operator.solver.legendre import associated_legendre, legendre_series
+
+
+@pytest.mark.parametrize("num_streams", [2, 8, 32])
+def test_double_gauss_integrates_polynomials(num_streams):
+    mu, weight = double_gauss(num_streams)
+    for power in range(num_streams):
+        np.testing.assert_allclose(np.sum(weight * mu**power), 1 / (power + 1), rtol=1e-13)
+
+
+def test_legendre_functions_satisfy_the_addition_theorem():
+    mu, other, azimuth = 0.3, 0.8, 1.1
+    p = np.asarray(associated_legendre(12, 12, jnp.asarray([mu, other])))
+    series = [
+        sum((2 - (m == 0)) * p[m, l, 0] * p[m, l, 1] * np.cos(m * azimuth) for m in range(12))
+        for l in range(12)  # noqa: E741
+    ]
+    cosine = mu * other + np.sqrt((1 - mu**2) * (1 - other**2)) * np.cos(azimuth)
+    expected = [np.polynomial.legendre.Legendre.basis(k)(cosine) for k in range(12)]
+    np.testing.assert_allclose(series, expected, rtol=1e-12, atol=1e-14)
+    constants = associated_legendre(12, 12, np.array([mu, other]))
+    np.testing.assert_allclose(constants, p, rtol=1e-13, atol=1e-15)
+
+
+def test_legendre_series_sums_henyey_greenstein():
+    g, cosine = 0.5, 0.2
+    total = legendre_series(jnp.asarray(g ** np.arange(80.0))[None], jnp.asarray(cosine))
+    expected = (1 - g**2) / (1 + g**2 - 2 * g * cosine) ** 1.5
+    np.testing.assert_allclose(total[0], expected, rtol=1e-13)
+
+
+def random_bordered(rng, nodes=3, batch=()):
+    core = rng.normal(size=(nodes, nodes, *batch))
+    core = np.einsum("ik...,jk...->ij...", core, core) + 3 * np.eye(nodes).reshape(
+        nodes, nodes, *(1,) * len(batch)
+    )
+    parts = (
+        rng.normal(size=(nodes, 2, *batch)),
+        rng.uniform(1, 2, (2, *batch)),
+        rng.normal(size=batch),
+    )
+    return Bordered(*(jnp.asarray(x) for x in (core, *parts)))
+
+
+def dense(matrix):
+    """The matrix over (nodes, sun, view)."""
+    n = matrix.core.shape[0]
+    full = np.zeros((n + 2, n + 2))
+    full[:n, :n], full[:n, n] = matrix.core, matrix.border[:, 0]
+    full[n, n], full[n + 1, n + 1] = matrix.diagonal
+    full[n + 1, :n], full[n + 1, n] = matrix.border[:, 1], matrix.corner
+    return full
+
+
+def test_bordered_algebra_is_matrix_algebra():
+    rng = np.random.default_rng(0)
+    a, b, c = (random_bordered(rng) for _ in range(3))
+    np.testing.assert_allclose(dense(a.inverse()), np.linalg.inv(dense(a)), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(dense(2.0 * a - b), 2 * dense(a) - dense(b))
+    product = dense(between(a, b, c))
+    expected = dense(a) @ np.linalg.inv(dense(b)) @ dense(c)
+    # `between` keeps the view's row from the right factor's transpose: exact where the product is
+    # symmetric, as it is here for left = right.
+    symmetric = dense(a) @ np.linalg.inv(dense(b)) @ dense(a)
+    np.testing.assert_allclose(dense(between(a, b, a)), symmetric, rtol=1e-12, atol=1e-13)
+    n = 3
+    np.testing.assert_allclose(product[:, n], expected[:, n], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(product[n + 1], expected[n + 1], rtol=1e-12, atol=1e-13)
+
+
+def test_kernels_read_the_same_alone_and_in_a_batch():
+    rng = np.random.default_rng(1)
+    batch = random_bordered(rng, batch=(5,)), random_bordered(rng, batch=(5,))
+    tau = jnp.asarray(rng.uniform(0, 2, 5))
+    together = half_layer(*batch, tau, 2)[0].core
+    for i in range(5):
+        a, b = (
+            Bordered(*(x[..., i] for x in (m.core, m.border, m.diagonal, m.corner))) for m in batch
+        )
+        np.testing.assert_allclose(
+            half_layer(a, b, tau[i], 2)[0].core, together[..., i], rtol=1e-12
+        )
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
+def test_inverse_of_positive_definite_matrices(n):
+    rng = np.random.default_rng(n)
+    root = rng.normal(size=(n, n, 7))
+    a = jnp.asarray(np.einsum("ikb,jkb->ijb", root, root)) + jnp.eye(n)[..., None]
+    identity = np.broadcast_to(np.eye(n)[..., None], a.shape)
+    np.testing.assert_allclose(matmul(a, inverse(a)), identity, atol=1e-12)
+
+
+def test_map_tiles_fills_up_the_last_tile():
+    x = jnp.arange(14.0).reshape(2, 7)
+    np.testing.assert_array_equal(map_tiles(lambda a: 2 * a, (x,), 3), 2 * x)
+    np.testing.assert_array_equal(map_tiles(lambda a: 2 * a, (x,), 7), 2 * x)
+
+
+def test_safe_functions_have_values_and_slopes_where_others_do_not():
+    zero = jnp.zeros(())
+    assert jax.value_and_grad(safe_sqrt)(zero) == (0, 0)
+    value, slopes = jax.value_and_grad(safe_divide, argnums=(0, 1))(zero + 1, zero)
+    assert value == 0 and slopes == (0, 0)
+    assert safe_divide(zero + 6, zero + 3) == 2
+
+
+def test_more_doublings_for_thicker_layers_and_lower_sun():
+    assert sufficient_doublings(0.01, 0.5, 8) == 1
+    assert sufficient_doublings(1e5, 1e-3, 8) <= 13
+    steps = [sufficient_doublings(t, 0.3, 8) for t in (0.01, 1, 30, 1e3, 1e6)]
+    assert steps == sorted(steps)

@@ -1,0 +1,173 @@
+"""Closed forms, invariances and errors of the solver's door."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from columns import simple_columns
+
+from abi_operator.solver import toa_brf
+
+# A few hundred products and inverses of well-conditioned matrices.
+ROUNDING = 1e-12
+# The residue of doubling a layer in two different ways; the start of a layer errs by 1e-12.
+SPLIT = 1e-10
+
+
+def brf(columns, num_streams=8, num_doublings=5, **options):
+    return np.asarray(
+        toa_brf(*columns, num_streams=num_streams, num_doublings=num_doublings, **options)
+    )
+
+
+def test_without_atmosphere_it_is_the_albedo():
+    tau, *rest = simple_columns()
+    np.testing.assert_allclose(brf((0 * tau, *rest)), rest[2], rtol=ROUNDING)
+
+
+def test_without_scattering_the_ground_shines_through_both_paths():
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    expected = albedo * np.exp(-tau.sum(axis=1) * (1 / mu0 + 1 / mu))
+    result = brf((tau, 0 * ssa, moments, albedo, mu0, mu, azimuth), num_doublings=7)
+    np.testing.assert_allclose(result, expected, rtol=1e-9)
+
+
+def test_thin_layer_scatters_once_exactly():
+    tau, ssa, _, albedo, mu0, mu, azimuth = simple_columns()
+    g, thin = 0.7, 1e-8 * tau
+    moments = np.broadcast_to(g ** np.arange(129), (*tau.shape, 129))
+    angle = -mu * mu0 - np.sqrt((1 - mu**2) * (1 - mu0**2)) * np.cos(azimuth)
+    phase = (1 - g**2) / (1 + g**2 - 2 * g * angle) ** 1.5
+    expected = (ssa * thin).sum(axis=1) * phase / (4 * mu * mu0)
+    result = brf((thin, ssa, moments, 0 * albedo, mu0, mu, azimuth))
+    # What is scattered twice is smaller by tau; the 128th moment of g = 0.7 is 1e-20.
+    np.testing.assert_allclose(result, expected, rtol=1e-6)
+
+
+def test_nothing_is_lost_between_white_ground_and_white_air():
+    """With ssa = 1 over albedo 1 the mean of the BRF over all views, weighted by mu, is 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    mu, weight = (nodes + 1) / 2, weights / 2
+    layers = 4
+    shape = (mu.size, layers)
+    tau = np.broadcast_to([0.1, 3.0, 200.0, 0.5], shape)
+    moments = np.broadcast_to(0.85 ** np.arange(17), (*shape, 17))
+    mode0 = toa_brf(
+        tau, np.ones(shape), moments, np.ones(8), np.full(8, 0.6), mu, np.zeros(8),
+        num_streams=16, num_modes=1, single_scattering=None,
+    )  # fmt: skip
+    np.testing.assert_allclose(2 * np.sum(weight * mu * mode0), 1, rtol=1e-11)
+
+
+def test_swapping_sun_and_satellite_changes_nothing():
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    there = brf((tau, ssa, moments, albedo, mu0, mu, azimuth))
+    back = brf((tau, ssa, moments, albedo, mu, mu0, azimuth))
+    np.testing.assert_allclose(there, back, rtol=1e-11)
+
+
+def test_split_layers_and_empty_layers_change_nothing():
+    columns = simple_columns()
+    whole = brf(columns)
+    tau, ssa, moments, *rest = columns
+    halves = [np.repeat(x, 2, axis=1) for x in (0.5 * tau, ssa, moments)]
+    np.testing.assert_allclose(brf((*halves, *rest)), whole, rtol=SPLIT)
+    empty = [np.insert(x, [0, 2, 5], 0.0, axis=1) for x in (tau, ssa, moments)]
+    np.testing.assert_allclose(brf((*empty, *rest)), whole, rtol=1e-13)
+
+
+@pytest.mark.parametrize("count", [1, 7, 300])
+def test_batch_order_subset_and_tiles_change_nothing(count):
+    columns = simple_columns(count=count)
+    order = np.random.default_rng(0).permutation(count)
+    whole = brf(columns)
+    np.testing.assert_allclose(brf([x[order] for x in columns]), whole[order], rtol=1e-13)
+    single = [float(brf([x[i] for x in columns])) for i in range(min(count, 3))]
+    np.testing.assert_allclose(single, whole[:3], rtol=1e-13)
+
+
+def test_leading_axes_broadcast():
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    albedos = np.array([0.0, 0.1, 0.5])[:, None]
+    grid = brf((tau, ssa, moments, albedos, mu0, mu, azimuth))
+    assert grid.shape == (3, 4)
+    one = brf((tau, ssa, moments, np.full(4, 0.1), mu0, mu, azimuth))
+    np.testing.assert_allclose(grid[1], one, rtol=1e-13)
+
+
+def test_doublings_chosen_from_the_data_equal_more_of_them():
+    columns = simple_columns()
+    chosen = brf(columns, num_doublings=None)
+    np.testing.assert_allclose(chosen, brf(columns, num_doublings=9), rtol=1e-10)
+    traced = jax.jit(lambda *a: toa_brf(*a, num_streams=8))(*columns)
+    np.testing.assert_allclose(chosen, traced, rtol=1e-10)
+
+
+def test_backscatter_is_where_relative_azimuth_is_zero():
+    """A backward-peaked layer is brightest with sun and satellite on the same side."""
+    tau, ssa = np.full(1, 0.2), np.ones(1)
+    moments = ((-0.6) ** np.arange(65))[None]
+    same, opposite = (
+        toa_brf(tau, ssa, moments, 0.0, 0.6, 0.6, azimuth, num_streams=8)
+        for azimuth in (0.0, np.pi)
+    )
+    assert same > 2 * opposite
+
+
+def test_exact_phase_function_equals_a_long_enough_series():
+    tau, ssa, _, albedo, mu0, mu, azimuth = simple_columns()
+    g = 0.6
+    angle = -mu * mu0 - np.sqrt((1 - mu**2) * (1 - mu0**2)) * np.cos(azimuth)
+    phase = np.repeat(((1 - g**2) / (1 + g**2 - 2 * g * angle) ** 1.5)[:, None], 5, axis=1)
+    long = np.broadcast_to(g ** np.arange(129), (4, 5, 129))
+    summed = brf((tau, ssa, long, albedo, mu0, mu, azimuth))
+    given = brf((tau, ssa, long[..., :9], albedo, mu0, mu, azimuth), phase_function=phase)
+    np.testing.assert_allclose(summed, given, rtol=1e-11)
+
+
+@pytest.mark.float32
+def test_float32_in_float32_out_and_near_float64():
+    columns = [np.asarray(x, np.float32) for x in simple_columns(count=50)]
+    single = toa_brf(*columns, num_streams=8, num_doublings=5)
+    assert single.dtype == jnp.float32
+    with jax.enable_x64(True):
+        double = brf([np.asarray(x, np.float64) for x in columns])
+    # Some thousand roundings of 6e-8 each, mostly of random sign.
+    np.testing.assert_allclose(single, double, rtol=1e-4)
+
+
+def test_float32_never_computes_in_float64():
+    columns = [jnp.asarray(x, jnp.float32) for x in simple_columns()]
+    jaxpr = jax.make_jaxpr(lambda *a: toa_brf(*a, num_streams=8))(*columns)
+    assert "f64" not in str(jaxpr)
+
+
+def test_other_float_types_are_promoted_together():
+    columns = simple_columns()
+    mixed = [np.asarray(columns[0], np.float32), *columns[1:]]
+    assert toa_brf(*mixed, num_streams=8, num_doublings=5).dtype == jnp.result_type(float)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"num_streams": 7}, "num_streams must be even and at least 2; got 7"),
+        ({"num_streams": 40}, "need at least 41 moments .* got 33"),
+        ({"num_modes": 9, "num_streams": 8}, "num_modes must be 1 to num_streams = 8; got 9"),
+        ({"single_scattering": "ims"}, "must be 'tms' or None; got 'ims'"),
+        ({"num_doublings": -1}, "num_doublings must be 0 or more; got -1"),
+    ],
+)
+def test_bad_options_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        toa_brf(*simple_columns(), **change)
+
+
+def test_bad_shapes_are_refused():
+    tau, ssa, moments, *rest = simple_columns()
+    with pytest.raises(ValueError, match="same number of layers"):
+        toa_brf(tau[:, :3], ssa, moments, *rest)
+    with pytest.raises(ValueError, match="do not broadcast"):
+        toa_brf(tau[:3], ssa, moments, *rest)
+    with pytest.raises(ValueError, match="layer axis"):
+        toa_brf(0.1, ssa, moments, *rest)
