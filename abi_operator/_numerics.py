@@ -10,6 +10,7 @@ from functools import wraps
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
 from jaxtyping import Array, Float
 
@@ -32,8 +33,13 @@ def fenced(function: Callable) -> Callable:
 
 
 def safe_divide(numerator: Float[Array, "*#n"], denominator: Float[Array, "*#n"]) -> Array:
-    """Quotient; 0, with derivative 0, where the denominator is 0."""
-    empty = denominator == 0
+    """Quotient; 0, with derivative 0, where the denominator is 0.
+
+    A denominator whose square underflows (1e-19 in float32, 1e-154 in float64) counts as 0: the
+    derivative of the quotient divides by that square.
+    """
+    tiny = np.sqrt(np.finfo(denominator.dtype).tiny).item()
+    empty = jnp.abs(denominator) <= tiny
     return jnp.where(empty, 0, numerator / jnp.where(empty, 1, denominator))
 
 

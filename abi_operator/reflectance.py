@@ -97,7 +97,7 @@ def _uniform(state: State) -> tuple[State, tuple[int, ...]]:
     """Give all leaves one floating type; return the batch's shape and check that leaves share it."""
     leaves = jax.tree.leaves(state)
     arrays = [x for x in leaves if hasattr(x, "dtype")]
-    dtype = jax.dtypes.canonicalize_dtype(np.result_type(*arrays, np.float16))
+    dtype = jax.dtypes.canonicalize_dtype(np.result_type(*(x.dtype for x in arrays), np.float16))
     state = jax.tree.map(lambda x: jnp.asarray(x).astype(dtype), state)
     batch = state.geometry.solar_zenith.shape
     for path, leaf in jax.tree_util.tree_leaves_with_path(state):

@@ -1,0 +1,75 @@
+"""Scattering and absorption by one aerosol plume."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..atmosphere import Atmosphere
+from ..bands import Band
+from ..optical_properties import OpticalProperties, Scatterer
+from .phase import HenyeyGreenstein
+
+
+def overlap(
+    height: Float[Array, " level"], base: Float[Array, ""], top: Float[Array, ""]
+) -> Float[Array, " layer"]:
+    r"""Length of each layer that lies between `base` and `top`.
+
+    .. math:: h_k = c(z_k) - c(z_{k+1}), \qquad
+       c(z) = \min(\max(z, z_\mathrm{base}), z_\mathrm{top})
+
+    Differences of one clipped height sum to ``top - base`` on any levels that cover the plume.
+    Where an edge lies on a level its derivative is the one-sided one of a shrinking plume: it goes
+    to the layer inside.
+
+    Parameters
+    ----------
+    height
+        Height of the levels, top first. [m]
+    base, top
+        Edges, base below top, above the same zero as `height`. [m]
+    """
+    clipped = jnp.where(height >= top, top, jnp.where(height <= base, base, height))
+    return -jnp.diff(clipped)
+
+
+def aerosol(atmosphere: Atmosphere, plume: str, band: Band) -> OpticalProperties:
+    r"""Optical properties of one plume, with the phase function of Henyey and Greenstein.
+
+    .. math:: \tau_k = b\, \beta_{550}\, r_\mathrm{band}\, h_k
+
+    with brightness b, extinction coefficient :math:`\beta_{550}`, relative extinction r and the
+    length h of the layer inside the plume (`overlap`).
+
+    Parameters
+    ----------
+    atmosphere
+        One column, of which the height and the plume are read.
+    plume
+        Name of the plume in `atmosphere`.
+    band
+        Band, for which the plume must be specified.
+
+    Raises
+    ------
+    ValueError
+        Where the atmosphere has no such plume or the plume no such band.
+    """
+    if plume not in atmosphere.plumes:
+        raise ValueError(f"no plume {plume!r}; the atmosphere has {sorted(atmosphere.plumes)}.")
+    properties = atmosphere.plumes[plume]
+    for name in ("relative_extinction", "ssa", "asymmetry"):
+        if band.name not in getattr(properties, name):
+            raise ValueError(
+                f"{name} of plume {plume!r} is not specified in band {band.name!r}, only in "
+                f"{sorted(getattr(properties, name))}."
+            )
+    coefficient = (
+        properties.brightness
+        * properties.extinction_550
+        * properties.relative_extinction[band.name]
+    )
+    above_ground = atmosphere.height - atmosphere.height[-1]
+    extinction = coefficient * overlap(above_ground, properties.base, properties.top)
+    phase = HenyeyGreenstein(properties.asymmetry[band.name])
+    scatterer = Scatterer(properties.ssa[band.name] * extinction, phase)
+    return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))

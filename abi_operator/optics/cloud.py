@@ -1,0 +1,47 @@
+"""Scattering and absorption by the droplets of liquid cloud."""
+
+import jax.numpy as jnp
+
+from ..atmosphere import Atmosphere
+from ..bands import Band
+from ..constants import WATER_DENSITY
+from ..optical_properties import OpticalProperties, Scatterer
+from .anomalous_diffraction import mean_efficiencies
+from .droplets import NU, effective_radius
+from .phase import HenyeyGreenstein
+from .water import REFRACTIVE_INDEX, droplet_asymmetry
+
+# Radius at which the formulas are evaluated, to no effect, where there is no cloud. [m]
+_IDLE_RADIUS = 1e-5
+
+
+def liquid_cloud(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
+    r"""Optical properties of liquid cloud, from mass and number of its droplets.
+
+    .. math:: \tau = \frac{3\, m\, \bar Q_\mathrm{ext}}{4\, \rho_w\, r_\mathrm{eff}}
+
+    with efficiencies by modified anomalous diffraction (`mean_efficiencies`), and the phase
+    function of Henyey and Greenstein with the asymmetry factor of Mie theory
+    (`droplet_asymmetry`). A layer without mass or without number is empty, with derivative 0.
+
+    Parameters
+    ----------
+    atmosphere
+        One column, of which the liquid cloud is read.
+    band
+        Band for which the refractive index of water is tabulated.
+    """
+    if band.name not in REFRACTIVE_INDEX:
+        raise ValueError(f"no water index for band {band.name!r}; have {list(REFRACTIVE_INDEX)}.")
+    radius = effective_radius(atmosphere.liquid)
+    cloudy = radius > 0
+    radius = jnp.where(cloudy, radius, radius.dtype.type(_IDLE_RADIUS))
+    q_ext, q_abs = mean_efficiencies(
+        1e6 * radius, band.wavelength_um, REFRACTIVE_INDEX[band.name], NU
+    )
+    mass = jnp.where(cloudy, atmosphere.liquid.mass_path, 0)
+    cross_section = 3 * mass / (4 * WATER_DENSITY * radius)
+    extinction = cross_section * q_ext
+    phase = HenyeyGreenstein(droplet_asymmetry(1e6 * radius, band.name))
+    scatterer = Scatterer(extinction - cross_section * q_abs, phase)
+    return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))

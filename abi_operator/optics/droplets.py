@@ -1,0 +1,51 @@
+r"""Size distribution of cloud droplets, from their mass and number.
+
+Diameters follow a gamma distribution, dN/dD = N0 D^nu exp(-Lam D) with nu = 7, an effective
+variance 1 / (nu + 3) of 0.1. Of such droplets
+
+.. math:: m/N = \frac{\pi}{6} \rho_w \frac{\Gamma(\nu + 4)}{\Gamma(\nu + 1)} \Lambda^{-3},
+   \qquad r_\mathrm{eff} = \frac{\nu + 3}{2 \Lambda} .
+"""
+
+import math
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..atmosphere import LiquidCloud
+from ..constants import WATER_DENSITY
+
+# Shape of the gamma distribution, nu. [-] (effective variance 0.1: Hansen 1971,
+# doi:10.1175/1520-0469(1971)028<1400:MSOPLI>2.0.CO;2)
+NU = 7.0
+# Effective radii between which mass and number are believed. [m] Smaller droplets are haze, larger
+# ones drizzle; in both a model's number is unreliable and a derivative with respect to it useless.
+SMALLEST_RADIUS, LARGEST_RADIUS = 1e-6, 1e-4
+
+# Mass of the mean droplet where the effective radius is 1 m. [kg]
+_UNIT_MASS = math.pi / 6 * WATER_DENSITY * (NU + 1) * (NU + 2) * (NU + 3) * (2 / (NU + 3)) ** 3
+
+
+def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
+    """Effective radius of the droplets; 0, with derivative 0, in a layer without cloud. [m]
+
+    It is held between 1 and 100 um, so that a trace of mass spread over many droplets has a finite
+    derivative. A layer has no cloud unless both mass and number are positive; that mass comes with
+    number is checked where data enter a scene, not here.
+
+    Parameters
+    ----------
+    liquid
+        Mass and number of the droplets. [kg m-2], [m-2]
+    """
+    mass, number = liquid.mass_path, liquid.number_path
+    cloudy = (mass > 0) & (number > 0)
+    small = mass <= number * (_UNIT_MASS * SMALLEST_RADIUS**3)
+    large = mass >= number * (_UNIT_MASS * LARGEST_RADIUS**3)
+    usual = cloudy & ~small & ~large
+    # Roots are divided, and not masses, as the derivative of a quotient squares its denominator.
+    radius = jnp.cbrt(jnp.where(usual, mass, 1)) / jnp.cbrt(jnp.where(usual, number, 1))
+    radius = radius * _UNIT_MASS ** (-1 / 3)
+    smallest, largest = (radius.dtype.type(limit) for limit in (SMALLEST_RADIUS, LARGEST_RADIUS))
+    radius = jnp.where(small, smallest, jnp.where(large, largest, radius))
+    return jnp.where(cloudy, radius, 0)

@@ -1,0 +1,68 @@
+r"""Liquid water in the ABI bands: refractive index, and asymmetry factor of its droplets."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+# n - ik of liquid water at the centroids of GOES-16. [-] (D. J. Segelstein, "The complex refractive
+# index of water", M.S. thesis, University of Missouri-Kansas City, 1981; n interpolated linearly, k
+# log-log, from the tables of refractiveindex.info, CC0)
+REFRACTIVE_INDEX: dict[str, complex] = {
+    "C01": 1.3419 - 7.228e-10j,
+    "C02": 1.3312 - 1.569e-8j,
+    "C03": 1.3244 - 3.527e-7j,
+    "C06": 1.2825 - 3.635e-4j,
+}
+
+# Asymmetry factor of gamma distributions (nu = 7) of spheres with this refractive index, against
+# effective radius. [um], [-] (Mie theory, miepython 3.3, 40000 diameters in 0.05-500 um equidistant
+# in their logarithm; 2 and 50 um are there so that zero end slopes cost nothing in 2.5-40 um)
+EFFECTIVE_RADIUS_UM = (2, 2.5, 3, 3.5, 4, 4.5, 5, 6, 7, 8, 10, 12, 15, 20, 30, 40, 50)
+# fmt: off
+ASYMMETRY: dict[str, tuple[float, ...]] = {
+    "C01": (0.81724, 0.82779, 0.83471, 0.83989, 0.84395, 0.84724, 0.84995, 0.85418, 0.85734,
+            0.85980, 0.86339, 0.86590, 0.86853, 0.87132, 0.87428, 0.87586, 0.87684),
+    "C02": (0.79777, 0.81553, 0.82595, 0.83278, 0.83784, 0.84188, 0.84522, 0.85047, 0.85441,
+            0.85749, 0.86202, 0.86519, 0.86851, 0.87203, 0.87583, 0.87787, 0.87914),
+    "C03": (0.77246, 0.79215, 0.80861, 0.81987, 0.82754, 0.83307, 0.83736, 0.84384, 0.84869,
+            0.85249, 0.85811, 0.86207, 0.86624, 0.87069, 0.87551, 0.87812, 0.87978),
+    "C06": (0.86362, 0.86179, 0.84976, 0.83323, 0.81745, 0.80633, 0.80119, 0.80425, 0.81468,
+            0.82566, 0.84278, 0.85367, 0.86362, 0.87370, 0.88565, 0.89309, 0.89848),
+}
+# fmt: on
+
+
+def droplet_asymmetry(effective_radius_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+    """Asymmetry factor of cloud droplets, constant below 2 and above 50 um. [-]
+
+    Between the radii of the table it is a cubic in the logarithm of radius, with a slope that is
+    continuous everywhere and zero at both ends.
+
+    Parameters
+    ----------
+    effective_radius_um
+        Effective radius, above 0. [um]
+    band
+        Name of the band.
+    """
+    dtype = effective_radius_um.dtype
+    nodes = np.log(EFFECTIVE_RADIUS_UM)
+    cubics = jnp.asarray(_hermite_cubics(nodes, np.asarray(ASYMMETRY[band])), dtype)
+    knots = jnp.asarray(nodes, dtype)
+    x = jnp.clip(jnp.log(effective_radius_um), knots[0], knots[-1])
+    interval = jnp.sum(x[..., None] >= knots[1:-1], axis=-1)
+    t = x - knots[interval]
+    c0, c1, c2, c3 = jnp.moveaxis(cubics[interval], -1, 0)
+    return c0 + t * (c1 + t * (c2 + t * c3))
+
+
+def _hermite_cubics(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Coefficients (interval, power) of cubics in x - x[i]: parabolic slopes, 0 at both ends."""
+    width = np.diff(x)
+    secant = np.diff(y) / width
+    slope = np.zeros_like(y)
+    slope[1:-1] = (width[1:] * secant[:-1] + width[:-1] * secant[1:]) / (width[1:] + width[:-1])
+    left, right = slope[:-1], slope[1:]
+    quadratic = (3 * secant - 2 * left - right) / width
+    cubic = (left + right - 2 * secant) / width**2
+    return np.stack([y[:-1], left, quadratic, cubic], axis=1)

@@ -1,0 +1,83 @@
+"""Liquid cloud from mass and number."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator.atmosphere import LiquidCloud
+from abi_operator.bands import BANDS, Band
+from abi_operator.constants import WATER_DENSITY
+from abi_operator.optics import effective_radius, liquid_cloud
+
+
+def with_cloud(atmosphere, mass, number):
+    dtype = atmosphere.pressure.dtype
+    liquid = LiquidCloud(jnp.asarray(mass, dtype), jnp.asarray(number, dtype))
+    return dataclasses.replace(atmosphere, liquid=liquid)
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_optical_depth_against_mie(make_atmosphere, droplet_mie, band):
+    atmosphere = make_atmosphere()
+    optics = liquid_cloud(atmosphere, BANDS[band])
+    layer = 7
+    mass = atmosphere.liquid.mass_path[layer]
+    radius = effective_radius(atmosphere.liquid)[layer]
+    q_ext, q_abs, asymmetry = droplet_mie(band, 1e6 * float(radius))
+    expected = 3 * mass * q_ext / (4 * WATER_DENSITY * radius)
+    # Errors of modified anomalous diffraction at the 9.4 um of this layer; see its own tests.
+    np.testing.assert_allclose(optics.tau[0, layer], expected, rtol=0.05)
+    np.testing.assert_allclose(1 - optics.ssa[0, layer], q_abs / q_ext, rtol=0.16)
+    np.testing.assert_allclose(optics.moments(2)[layer, 1], asymmetry, rtol=0, atol=1e-3)
+
+
+def test_clear_layers_are_empty(make_atmosphere):
+    optics = liquid_cloud(make_atmosphere(), BANDS["C02"])
+    clear = [0, 1, 2, 3, 4, 5, 9]
+    assert np.all(optics.tau[0, 6:9] > 1)
+    np.testing.assert_array_equal(optics.tau[0, clear], 0)
+    np.testing.assert_array_equal(optics.ssa[0, clear], 0)
+    np.testing.assert_array_equal(optics.moments(3)[jnp.array(clear)], [[1, 0, 0]] * 7)
+
+
+def test_mass_without_number_is_empty(make_atmosphere):
+    atmosphere = with_cloud(make_atmosphere(4), [0.1] * 4, [0.0, -0.0, -1.0, -1e9])
+    np.testing.assert_array_equal(liquid_cloud(atmosphere, BANDS["C01"]).tau, 0)
+
+
+def test_depth_is_linear_in_traces_of_mass(make_atmosphere):
+    mass, number = 1e-12 * np.arange(1, 5), np.full(4, 1e10)
+    tau = liquid_cloud(with_cloud(make_atmosphere(4), mass, number), BANDS["C01"]).tau[0]
+    np.testing.assert_allclose(tau, float(tau[0]) * np.arange(1, 5), rtol=1e-14)
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize("band", BANDS)
+def test_derivatives_are_finite_at_any_mass_and_number(make_atmosphere, mode, band):
+    values = [0.0, 1e-30, 1e-18, 1e-3, 1.0, 1e10]
+    mass, number = (grid.ravel() for grid in np.meshgrid(values, values))
+    atmosphere = make_atmosphere(num_layers=mass.size, dtype=jnp.float32)
+
+    def outputs(liquid):
+        optics = liquid_cloud(dataclasses.replace(atmosphere, liquid=liquid), BANDS[band])
+        asymmetry = optics.scatterers[0].phase.moments(2)[:, 1]
+        # Layers are independent of each other, so the sum keeps every derivative apart.
+        return jnp.stack([optics.tau.sum(), optics.scattering.sum(), asymmetry.sum()])
+
+    liquid = with_cloud(atmosphere, mass, number).liquid
+    jacobian = jax.jit(mode(outputs))(liquid)
+    assert np.all(np.isfinite(outputs(liquid)))
+    assert np.all(np.isfinite(jacobian.mass_path))
+    assert np.all(np.isfinite(jacobian.number_path))
+    empty = (mass == 0) | (number == 0)
+    np.testing.assert_array_equal(jacobian.mass_path[:, empty], 0)
+    np.testing.assert_array_equal(jacobian.number_path[:, empty], 0)
+
+
+def test_unknown_band_is_named(make_atmosphere):
+    with pytest.raises(ValueError, match="no water index for band 'C13'"):
+        liquid_cloud(make_atmosphere(), Band("C13", 10.34))

@@ -1,0 +1,63 @@
+"""Refractive index of water against its source, asymmetry of droplets against Mie theory."""
+
+from importlib.resources import files
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator.bands import BANDS
+from abi_operator.optics.water import (
+    ASYMMETRY,
+    EFFECTIVE_RADIUS_UM,
+    REFRACTIVE_INDEX,
+    droplet_asymmetry,
+)
+
+MIE = 1e-3  # of interpolation between the radii of the table, and of the sums over sizes
+ENDS = (EFFECTIVE_RADIUS_UM[0], EFFECTIVE_RADIUS_UM[-1])
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_refractive_index_is_segelsteins(band):
+    table = files("miepython").joinpath("data/segelstein81_index.txt").read_text()
+    wavelength, n, k = np.loadtxt(table.splitlines()[4:]).T
+    centroid, index = BANDS[band].wavelength_um, REFRACTIVE_INDEX[band]
+    np.testing.assert_allclose(index.real, np.interp(centroid, wavelength, n), atol=1e-4)
+    log_k = np.interp(np.log(centroid), np.log(wavelength), np.log(k))
+    np.testing.assert_allclose(-index.imag, np.exp(log_k), rtol=1e-3)
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_asymmetry_against_mie(droplet_mie, band):
+    radii = [2.5, 2.7, 3.2, 4.0, 4.25, 5.5, 7.5, 10.0, 13.5, 25.0, 35.0, 40.0]
+    expected = [droplet_mie(band, radius)[2] for radius in radii]
+    value = droplet_asymmetry(jnp.asarray(radii), band)
+    np.testing.assert_allclose(value, expected, rtol=0, atol=MIE)
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_asymmetry_passes_through_the_table_and_is_constant_beyond(band):
+    radii = np.array([0.5, *EFFECTIVE_RADIUS_UM, 200.0])
+    table = ASYMMETRY[band]
+    expected = [table[0], *table, table[-1]]
+    np.testing.assert_allclose(droplet_asymmetry(jnp.asarray(radii), band), expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_slope_is_continuous_and_zero_at_the_ends(band):
+    slope = jax.vmap(jax.grad(lambda radius: droplet_asymmetry(radius, band)))
+    nodes, nearby = np.asarray(EFFECTIVE_RADIUS_UM, float), 1e-9
+    below, above = slope(nodes * (1 - nearby)), slope(nodes * (1 + nearby))
+    # The second derivative times the distance between the two points is what may differ.
+    np.testing.assert_allclose(below, above, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(slope(np.array([1.0, *ENDS, 100.0])), 0, atol=1e-15)
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize("band", BANDS)
+def test_float32_stays(band):
+    value = droplet_asymmetry(jnp.asarray(EFFECTIVE_RADIUS_UM, jnp.float32), band)
+    assert value.dtype == jnp.float32
+    np.testing.assert_allclose(value, ASYMMETRY[band], rtol=3e-7)

@@ -1,0 +1,154 @@
+"""The operator against an independent path, in batches, and its derivatives."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from cdisort import cdisort_brf
+from states import column
+
+import abi_operator
+from abi_operator import BANDS, brf, reflectance, reflectance_factor
+from abi_operator.optical_properties import OpticalProperties
+
+# Rayleigh depth at 1013.25 hPa and beta2 (Bodhaine et al. 1999); smoke relative to 555 nm, its
+# single-scattering albedo and asymmetry (6SV2.1): typed again here, from the sources.
+RAYLEIGH = {"C01": (0.18411, 0.47867), "C02": (0.05381, 0.47930), "C03": (0.01555, 0.47960)}
+RAYLEIGH["C06"] = (0.000338, 0.4799)
+SMOKE = {"C01": (1.3573, 0.9391, 0.6585), "C02": (0.7477, 0.9234, 0.5831)}
+SMOKE |= {"C03": (0.3827, 0.8961, 0.4994), "C06": (0.0782, 0.8220, 0.6180)}
+# The largest difference that one smoke row's last digit, 5e-5 in ssa, makes.
+TABLE_DIGITS = 1e-4
+
+
+def test_equals_cdisort_on_layers_built_from_published_numbers():
+    """Rayleigh and smoke at 1-3 km over grey ground, layers mixed in NumPy, no optics of ours."""
+    state = column(liquid=0.0)
+    height = np.asarray(state.atmosphere.height)
+    pressure = np.asarray(state.atmosphere.pressure)
+    # 0.550 um lies between the C01 centroid and 0.555 um; log-log interpolation of the extinction.
+    slope = np.log(SMOKE["C01"][0]) / np.log(0.4711 / 0.555)
+    at_550 = (0.55 / 0.555) ** slope
+    inside = np.clip(np.minimum(height[:-1], 3000) - np.maximum(height[1:], 1000), 0, None) / 2000
+    result = brf(state, num_streams=16)
+    for i, name in enumerate(BANDS):
+        depth, beta2 = RAYLEIGH[name]
+        air = depth * np.diff(pressure) / 101325
+        extinction, ssa, g = SMOKE[name]
+        haze = 0.8 * extinction / at_550 * inside
+        rayleigh = np.zeros(200)
+        rayleigh[[0, 2]] = 1, beta2 / 5
+        scattering = air + ssa * haze
+        moments = air[:, None] * rayleigh + (ssa * haze)[:, None] * g ** np.arange(200)
+        expected = cdisort_brf(
+            air + haze, scattering / (air + haze), moments / scattering[:, None], 0.1,
+            np.cos(0.6), np.cos(0.8), 1.2, 16, True,
+        )  # fmt: skip
+        np.testing.assert_allclose(result[i], expected, rtol=TABLE_DIGITS, err_msg=name)
+
+
+def test_reflectance_factor_contains_the_cosine_of_the_sun():
+    state = column()
+    np.testing.assert_allclose(reflectance_factor(state), np.cos(0.6) * brf(state), rtol=1e-14)
+
+
+def test_ground_alone_shows_its_albedo():
+    state = column(liquid=0.0, smoke_aod=0.0, albedo=0.3)
+    state = eqx.tree_at(lambda s: s.atmosphere.pressure, state, replace_fn=lambda p: 0 * p)
+    np.testing.assert_allclose(brf(state), 0.3, rtol=1e-12)
+
+
+def test_bands_can_be_chosen_and_ordered():
+    state = column()
+    every = dict(zip(BANDS, brf(state), strict=True))
+    np.testing.assert_allclose(brf(state, ("C06", "C01")), [every["C06"], every["C01"]], rtol=1e-11)
+
+
+def test_batches_equal_single_columns():
+    states = [column(smoke_aod=a, albedo=b) for a, b in ((0.0, 0.05), (0.5, 0.2), (3.0, 0.6))]
+    batch = jax.tree.map(lambda *x: jnp.stack([jnp.asarray(y) for y in x]), *states)
+    together = brf(batch, num_doublings=5)
+    assert together.shape == (3, 4)
+    for one, state in zip(together, states, strict=True):
+        np.testing.assert_allclose(one, brf(state, num_doublings=5), rtol=1e-13)
+    mapped = jax.vmap(lambda s: brf(s, num_doublings=5))(batch)
+    np.testing.assert_allclose(mapped, together, rtol=1e-13)
+
+
+def test_exponential_terms_are_weighted_runs(monkeypatch):
+    """A band of two gas terms is the weighted sum of two grey bands."""
+    plain = reflectance.column_optics
+
+    def absorbing(depths, weights):
+        def optics(atmosphere, band):
+            gas = jnp.asarray(depths)[:, None] * jnp.ones(atmosphere.height.shape[0] - 1)
+            return plain(atmosphere, band) + OpticalProperties(gas, jnp.asarray(weights), ())
+
+        return optics
+
+    def run(depths, weights, name):
+        monkeypatch.setattr(reflectance, "column_optics", absorbing(depths, weights))
+        jax.clear_caches()
+        return brf(column(), (name,), num_doublings=5)
+
+    single = [run([depth], [1.0], "C01") for depth in (0.01, 0.3)]
+    both = run([0.01, 0.3], [0.25, 0.75], "C01")
+    jax.clear_caches()
+    np.testing.assert_allclose(both, 0.25 * single[0] + 0.75 * single[1], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "state", [column(), column(liquid=0, smoke_aod=0)], ids=["cloud and smoke", "clear"]
+)
+def test_jacobian_of_every_leaf(state):
+    """Forward equals reverse and differences; finite where there is no cloud and no plume."""
+    state = jax.tree.map(lambda x: jnp.asarray(x, jnp.float64), state)
+    function = jax.jit(lambda s: reflectance_factor(s, num_doublings=5))
+    forward, reverse = jax.jacfwd(function)(state), jax.jacrev(function)(state)
+    leaves = jax.tree_util.tree_leaves_with_path(forward)
+    for (path, k), other in zip(leaves, jax.tree.leaves(reverse), strict=True):
+        name = jax.tree_util.keystr(path)
+        assert np.isfinite(k).all(), name
+        scale = np.abs(k).max() + 1e-300
+        np.testing.assert_allclose(k / scale, other / scale, atol=1e-8, err_msg=name)
+    for choose, step in (
+        (lambda s: s.atmosphere.plumes["smoke"].extinction_550, 1e-9),
+        (lambda s: s.atmosphere.plumes["smoke"].ssa["C02"], 1e-5),
+        (lambda s: s.albedo["C03"], 1e-5),
+        (lambda s: s.geometry.view_zenith, 1e-5),
+    ):
+        plus, minus = (eqx.tree_at(choose, state, choose(state) + sign * step) for sign in (1, -1))
+        difference = (function(plus) - function(minus)) / (2 * step)
+        scale = np.abs(choose(forward)).max() + 1e-12
+        np.testing.assert_allclose(choose(forward) / scale, difference / scale, atol=1e-5)
+
+
+@pytest.mark.float32
+def test_float32_states_give_float32_reflectances():
+    state = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), column())
+    single = brf(state, num_doublings=5)
+    assert single.dtype == jnp.float32
+    with jax.enable_x64(True):
+        double = brf(jax.tree.map(lambda x: jnp.asarray(x, jnp.float64), state), num_doublings=5)
+    np.testing.assert_allclose(single, double, rtol=1e-4)
+
+
+def test_errors_name_what_is_wrong():
+    state = column()
+    with pytest.raises(ValueError, match=r"\['C13'\] are not simulated; choose from \['C01'"):
+        brf(state, ("C01", "C13"))
+    with pytest.raises(ValueError, match="once"):
+        brf(state, ("C01", "C01"))
+    poor = eqx.tree_at(lambda s: s.albedo, state, {"C01": 0.1})
+    with pytest.raises(ValueError, match=r"state.albedo has no 'C02'; it holds \['C01'\]"):
+        brf(poor)
+    batch = jax.tree.map(lambda x: jnp.stack([jnp.asarray(x)] * 2), state)
+    uneven = eqx.tree_at(lambda s: s.atmosphere.height, batch, state.atmosphere.height)
+    with pytest.raises(ValueError, match=r"state.atmosphere.height has shape \(13,\)"):
+        brf(uneven)
+
+
+def test_public_names():
+    assert abi_operator.__version__
+    assert set(BANDS) == {"C01", "C02", "C03", "C06"}

@@ -1,0 +1,106 @@
+"""The house: imports go down, never sideways or up, and the door opens with JAX alone."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+FLOORS = [
+    {"cli"},
+    {"demo", "scene"},
+    {"files", "pictures", "products"},
+    {"reflectance"},
+    {"optics", "solver"},
+    {"optical_properties"},
+    {"atmosphere"},
+    {"geometry"},
+    {"_batching", "_numerics", "_version", "bands", "constants", "nomenclature"},
+]
+FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
+
+
+def imported(path: Path, package: str) -> list[str]:
+    """Modules of `package` that a file imports, as dotted names below the package."""
+    names = []
+    inside = list(path.relative_to(ROOT / package).parent.parts)
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = inside[: len(inside) - node.level + 1] + (node.module or "").split(".")
+            tails = [a.name for a in node.names] if not node.module else [""]
+            names += [".".join([*filter(None, base), *filter(None, [t])]) for t in tails]
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == package:
+            names.append(node.module.partition(".")[2] or node.names[0].name)
+    return names
+
+
+def sources(package: str) -> list[Path]:
+    return sorted((ROOT / package).rglob("*.py"))
+
+
+def room(path: Path) -> str:
+    return path.relative_to(ROOT / "abi_operator").parts[0].removesuffix(".py")
+
+
+def test_every_file_has_a_floor():
+    assert {room(p) for p in sources("abi_operator")} == set(FLOOR) | {"__init__"}
+
+
+def test_imports_go_down():
+    wrong = []
+    for path in sources("abi_operator"):
+        here = room(path)
+        for name in imported(path, "abi_operator"):
+            there = name.split(".")[0]
+            if here in ("__init__", there):
+                continue
+            if FLOOR[there] <= FLOOR[here]:
+                wrong.append(f"{path.relative_to(ROOT)} imports {name}")
+    assert not wrong
+
+
+def test_rooms_that_have_not_heard_of_each_other():
+    for path in sources("abi_operator"):
+        text = path.read_text()
+        if room(path) == "files":
+            assert "jax" not in text, f"{path}: readers know nothing of JAX"
+        if room(path) == "solver":
+            assert "aerosol" not in text.replace("knows\nnothing of aerosols", ""), path
+        assert "retrievals" not in [n.split(".")[0] for n in absolute(path)], path
+
+
+def absolute(path: Path) -> list[str]:
+    tree = ast.parse(path.read_text())
+    plain = [a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names]
+    return plain + [
+        n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and not n.level
+    ]
+
+
+def test_retrievals_use_public_names_only():
+    for path in sources("retrievals"):
+        for name in absolute(path):
+            if name.startswith("abi_operator"):
+                assert not any(part.startswith("_") for part in name.split(".")), (path, name)
+
+
+def test_imports_stand_at_the_head_of_files():
+    for path in [*sources("abi_operator"), *sources("retrievals")]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                inner = [x for x in ast.walk(node) if isinstance(x, ast.Import | ast.ImportFrom)]
+                assert not inner, f"{path}: {node.name} imports inside"
+
+
+def test_the_door_opens_with_jax_and_equinox_alone():
+    heavy = ("xarray", "netCDF4", "pandas", "pyorbital", "PIL", "typer", "optimistix", "matplotlib")
+    code = f"import sys, abi_operator; print([m for m in {heavy!r} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.stdout.strip() == "[]", result
+    flags = "import abi_operator, abi_operator.solver, jax; print(jax.config.jax_enable_x64)"
+    plain = {"PATH": "", "JAX_PLATFORMS": "cpu"}
+    result = subprocess.run(
+        [sys.executable, "-c", flags], capture_output=True, text=True, env=plain, cwd=ROOT
+    )
+    assert result.stdout.strip() == "False", result
