@@ -31,7 +31,9 @@ MODEL: dict[str, Variable] = {
     "latitude": Variable(HORIZONTAL, "degrees_north", "latitude", "latitude"),
     "longitude": Variable(HORIZONTAL, "degrees_east", "longitude", "longitude"),
     "layer_pressure": Variable(("layer", "y", "x"), "Pa", "pressure at mid-layer", "air_pressure"),
-    "surface_pressure": Variable(HORIZONTAL, "Pa", "pressure at the ground", "surface_air_pressure"),
+    "surface_pressure": Variable(
+        HORIZONTAL, "Pa", "pressure at the ground", "surface_air_pressure"
+    ),
     "height": Variable(("level", "y", "x"), "m", "height above sea level", "altitude"),
     "temperature": Variable(("layer", "y", "x"), "K", "air temperature", "air_temperature"),
     "vapour_mixing_ratio": Variable(

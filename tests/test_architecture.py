@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[1]
 
 FLOORS = [
     {"cli"},
+    {"simulation"},
     {"demo", "scene"},
     {"files", "pictures", "products"},
     {"reflectance"},

@@ -98,14 +98,17 @@ def test_exponential_terms_are_weighted_runs(monkeypatch):
     np.testing.assert_allclose(both, 0.25 * single[0] + 0.75 * single[1], rtol=1e-12)
 
 
+FUNCTION = jax.jit(lambda s: reflectance_factor(s, num_doublings=5))
+FORWARD, REVERSE = jax.jit(jax.jacfwd(FUNCTION)), jax.jit(jax.jacrev(FUNCTION))
+
+
 @pytest.mark.parametrize(
     "state", [column(), column(liquid=0, smoke_aod=0)], ids=["cloud and smoke", "clear"]
 )
 def test_jacobian_of_every_leaf(state):
     """Forward equals reverse and differences; finite where there is no cloud and no plume."""
     state = jax.tree.map(lambda x: jnp.asarray(x, jnp.float64), state)
-    function = jax.jit(lambda s: reflectance_factor(s, num_doublings=5))
-    forward, reverse = jax.jacfwd(function)(state), jax.jacrev(function)(state)
+    forward, reverse = FORWARD(state), REVERSE(state)
     leaves = jax.tree_util.tree_leaves_with_path(forward)
     for (path, k), other in zip(leaves, jax.tree.leaves(reverse), strict=True):
         name = jax.tree_util.keystr(path)
@@ -119,7 +122,7 @@ def test_jacobian_of_every_leaf(state):
         (lambda s: s.geometry.view_zenith, 1e-5),
     ):
         plus, minus = (eqx.tree_at(choose, state, choose(state) + sign * step) for sign in (1, -1))
-        difference = (function(plus) - function(minus)) / (2 * step)
+        difference = (FUNCTION(plus) - FUNCTION(minus)) / (2 * step)
         scale = np.abs(choose(forward)).max() + 1e-12
         np.testing.assert_allclose(choose(forward) / scale, difference / scale, atol=1e-5)
 

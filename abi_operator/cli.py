@@ -1,0 +1,166 @@
+"""The command line: ``abi-operator simulate`` and ``abi-operator demo``.
+
+Inputs are opened and checked before a folder is made; what is wrong with one of them is said in
+one sentence, with exit code 2. Other packages add commands of their own by entry points of the
+group ``abi_operator.commands``; the entry named ``demo`` is called at the end of the demonstration
+with the folder that holds its result.
+"""
+
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Annotated, Any
+
+import jax
+import typer
+
+from .bands import BANDS, check_bands
+from .demo import write_demo
+from .files import InputError, output_folder
+from .scene import GOES_EAST
+from .simulation import Report, Request, Species, open_scene, simulate_scene
+
+COMMANDS = "abi_operator.commands"
+"""Group of the entry points by which other packages add commands."""
+
+# Albedo of the sea in the demonstration. [-]
+_DEMO_OCEAN_ALBEDO = 0.03
+
+
+@contextmanager
+def _one_sentence() -> Iterator[None]:
+    """Say what is wrong with an input in one sentence, and leave with exit code 2."""
+    try:
+        yield
+    except InputError as error:
+        typer.echo(f"abi-operator: {error}", err=True)
+        raise typer.Exit(2) from None
+
+
+@contextmanager
+def _user_warnings() -> Iterator[None]:
+    """Collect warnings; print each once, as a plain line, at the end."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        yield
+    for message in dict.fromkeys(str(warning.message) for warning in caught):
+        typer.echo(f"warning: {message}", err=True)
+
+
+def _print(report: Report, out: Path) -> None:
+    for name in report.files:
+        typer.echo(f"wrote {out / name}")
+    for line in report.lines:
+        typer.echo(line)
+
+
+def simulate(
+    wrf: Annotated[Path, typer.Argument(metavar="WRFOUT", help="Output of WRF, any times.")],
+    out: Annotated[Path, typer.Option(help="Folder for the result and its pictures.")],
+    albedo: Annotated[
+        Path | None, typer.Option(help="MODIS albedo, MCD43A1 in NetCDF from AppEEARS.")
+    ] = None,
+    ocean_albedo: Annotated[
+        float | None, typer.Option(min=0, max=1, help="Albedo of water, in all bands.")
+    ] = None,
+    plume: Annotated[
+        Path | None, typer.Option(help="Greyscale PNG, one pixel a column, north at the top.")
+    ] = None,
+    plume_species: Annotated[Species, typer.Option(help="What the plume is made of.")] = (
+        Species.SMOKE
+    ),
+    plume_aod: Annotated[
+        float, typer.Option(min=0, help="Optical depth at 550 nm where the plume is white.")
+    ] = 2.0,
+    satellite_longitude: Annotated[
+        float, typer.Option(min=-180, max=360, help="In degrees, east positive.")
+    ] = GOES_EAST,
+    bands: Annotated[str, typer.Option(help="Bands to simulate.")] = ",".join(BANDS),
+    broadband: Annotated[
+        bool, typer.Option(help="Let broadband albedo stand in for missing spectral bands.")
+    ] = False,
+    num_streams: Annotated[int, typer.Option(min=2, help="Streams of the solver, even.")] = 8,
+) -> None:
+    """Simulate what the imager would see of a scene in a weather model's output."""
+    if num_streams % 2:
+        raise typer.BadParameter(f"the number of streams is even; got {num_streams}.")
+    try:
+        names = check_bands([name.strip() for name in bands.split(",")])
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    request = Request(
+        wrf,
+        albedo,
+        ocean_albedo,
+        plume,
+        plume_species,
+        plume_aod,
+        satellite_longitude,
+        names,
+        broadband,
+        num_streams,
+    )
+    with _one_sentence(), _user_warnings():
+        scene = open_scene(request)
+        with output_folder(out) as folder:
+            report = simulate_scene(scene, folder)
+        _print(report, out)
+
+
+def demo(
+    size: Annotated[int, typer.Option(min=8, help="Rows and columns of the scene.")] = 64,
+    out: Annotated[Path, typer.Option(help="Folder for inputs and results.")] = Path("abi-demo"),
+    seed: Annotated[int, typer.Option(min=0, help="Another seed is another coast.")] = 0,
+) -> None:
+    """Make up a smoky Californian coast, simulate it, and do what other packages add."""
+    with _one_sentence(), _user_warnings():
+        with output_folder(out) as folder:
+            inputs = write_demo(folder / "inputs", size=size, seed=seed)
+            request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume)
+            report = simulate_scene(open_scene(request), folder)
+        _print(report, out)
+    for entry in entry_points(group=COMMANDS, name="demo"):
+        finish_demo = _load(entry)
+        if finish_demo is not None:
+            with _one_sentence():
+                finish_demo(out)
+
+
+def _load(entry: EntryPoint) -> Callable[..., Any] | None:
+    """What an entry point names, or None with a note where its package does not import."""
+    try:
+        return entry.load()
+    except Exception as error:  # whatever ails another package, our own commands work
+        typer.echo(f"note: {entry.name} of {entry.module} is not available ({error})", err=True)
+        return None
+
+
+def make_app() -> typer.Typer:
+    """Build the command line with our commands and those of other packages."""
+    app = typer.Typer(
+        help="Differentiable synthetic imagery of the GOES-R Advanced Baseline Imager.",
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(_in_double_precision)
+    app.command()(simulate)
+    app.command()(demo)
+    for entry in sorted(entry_points(group=COMMANDS), key=lambda entry: entry.name):
+        command = None if entry.name == "demo" else _load(entry)
+        if command is not None:
+            app.command(entry.name)(command)
+    return app
+
+
+def _in_double_precision(context: typer.Context) -> None:
+    """Run every command in float64."""
+    context.with_resource(jax.enable_x64(True))
+
+
+def main() -> None:
+    """Run the command line."""
+    make_app()()

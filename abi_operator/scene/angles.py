@@ -1,0 +1,76 @@
+"""Where the sun and a geostationary satellite stand, seen from each column."""
+
+from typing import NamedTuple
+
+import numpy as np
+from pyorbital.astronomy import get_alt_az
+from pyorbital.orbital import get_observer_look
+
+from ..constants import SATELLITE_HEIGHT
+from ..nomenclature import GRAZING_ZENITH, QUALITY_FLAGS
+
+
+class Angles(NamedTuple):
+    """Directions of the sun and the satellite (y, x). [degree]
+
+    Parameters
+    ----------
+    solar_zenith, view_zenith
+        Angles from the local vertical.
+    relative_azimuth
+        Azimuth between satellite and sun, 0 to 180; 0 where they stand on the same side.
+    """
+
+    solar_zenith: np.ndarray
+    view_zenith: np.ndarray
+    relative_azimuth: np.ndarray
+
+
+def find_angles(
+    time: np.datetime64 | np.ndarray,
+    latitude: np.ndarray,
+    longitude: np.ndarray,
+    satellite_longitude: float,
+) -> Angles:
+    """Directions of the sun and the satellite by pyorbital, without refraction.
+
+    Parameters
+    ----------
+    time
+        One time, UTC.
+    latitude, longitude
+        Of the columns. [degree]
+    satellite_longitude
+        Longitude above which the satellite stands still, at 35786 km. [degree]
+    """
+    altitude, azimuth = get_alt_az(time, longitude, latitude)
+    satellite_azimuth, elevation = get_observer_look(
+        satellite_longitude,
+        0.0,
+        SATELLITE_HEIGHT / 1e3,
+        time,
+        longitude,
+        latitude,
+        np.zeros_like(latitude),
+    )
+    apart = np.abs(np.degrees(azimuth) - satellite_azimuth) % 360
+    return Angles(90 - np.degrees(altitude), 90 - elevation, np.minimum(apart, 360 - apart))
+
+
+def angle_flags(angles: Angles) -> np.ndarray:
+    """Bits of `nomenclature.QUALITY_FLAGS` that the directions set (y, x), uint8.
+
+    ``grazing_sun`` is set by day and ``grazing_view`` where the satellite is in sight: neither
+    comes with ``night`` or ``out_of_sight``.
+    """
+    night, out_of_sight = angles.solar_zenith >= 90, angles.view_zenith >= 90
+    bits = {
+        "grazing_sun": (angles.solar_zenith > GRAZING_ZENITH) & ~night,
+        "night": night,
+        "grazing_view": (angles.view_zenith > GRAZING_ZENITH) & ~out_of_sight,
+        "out_of_sight": out_of_sight,
+    }
+    flags = np.zeros(night.shape, np.uint8)
+    for name, holds in bits.items():
+        flags |= np.where(holds, np.uint8(QUALITY_FLAGS[name]), np.uint8(0))
+    return flags

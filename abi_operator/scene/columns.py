@@ -1,0 +1,87 @@
+"""From the variables of a scenario to the state of every column."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..atmosphere import Atmosphere, LiquidCloud, Plume, State
+from ..bands import BANDS, check_bands
+from ..geometry import Geometry
+from ..nomenclature import PLUME
+from .species import species_of
+
+
+def column_states(scenario: xr.Dataset, bands: Sequence[str] = tuple(BANDS)) -> State:
+    """State of every column of a scenario, or of a result at one time.
+
+    Parameters
+    ----------
+    scenario
+        A Dataset with the variables of a scenario and the dimensions y and x, or ``column`` in
+        their place.
+    bands
+        Bands for which albedo and plumes are wanted.
+
+    Returns
+    -------
+    State
+        NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
+        faster.
+    """
+    bands = check_bands(bands)
+    reader = _Reader(scenario)
+    surface_albedo = reader.by_band("surface_albedo", bands)
+    angles = {
+        name: np.radians(reader.values(f"{name}_angle"))
+        for name in ("solar_zenith", "view_zenith", "relative_azimuth")
+    }
+    liquid = LiquidCloud(
+        reader.values("liquid_mass_path", "layer"), reader.values("liquid_number_path", "layer")
+    )
+    plumes = {species: _plume(reader, species, bands) for species in species_of(scenario)}
+    atmosphere = Atmosphere(
+        reader.values("pressure", "level"), reader.values("height", "level"), liquid, plumes
+    )
+    return State(atmosphere, surface_albedo, Geometry(**angles))
+
+
+def horizontal(dataset: xr.Dataset) -> dict[str, int]:
+    """Horizontal dimensions of a Dataset and their sizes: y and x, or column."""
+    dims = ("column",) if "column" in dataset.dims else ("y", "x")
+    return {dim: dataset.sizes[dim] for dim in dims}
+
+
+class _Reader:
+    """Reads variables of a Dataset with one leading column axis.
+
+    Its NumPy arrays stand where states declare JAX's: the operator's door takes both.
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+        self._horizontal = horizontal(dataset)
+
+    def values(self, name: str, *dims: str, band: str | None = None) -> Any:
+        """A variable as (column, *dims), repeated where it is the same in all columns."""
+        array = self._dataset[name]
+        if band is not None:
+            array = array.sel(band=band)
+        missing = {d: n for d, n in self._horizontal.items() if d not in array.dims}
+        array = array.expand_dims(missing).transpose(*self._horizontal, *dims)
+        return array.values.reshape(-1, *array.shape[len(self._horizontal) :])
+
+    def by_band(self, name: str, bands: tuple[str, ...]) -> dict[str, Any]:
+        """A variable in each band, (column,)."""
+        return {band: self.values(name, band=band) for band in bands}
+
+
+def _plume(reader: _Reader, species: str, bands: tuple[str, ...]) -> Plume:
+    quantities: dict[str, Any] = {
+        quantity: reader.by_band(f"{species}_{quantity}", bands)
+        if entry.dims == ("band",)
+        else reader.values(f"{species}_{quantity}")
+        for quantity, entry in PLUME.items()
+    }
+    return Plume(**quantities)

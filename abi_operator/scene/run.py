@@ -1,0 +1,77 @@
+"""Simulate a scene that need not fit into memory: time by time, block of rows by block of rows."""
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+from tqdm import tqdm
+
+from .account import Attribute, add_accounts
+from .simulate import simulate
+
+ReadBlock = Callable[[int, slice], xr.Dataset]
+WriteBlock = Callable[[int, slice, xr.Dataset], None]
+
+
+def row_blocks(shape: tuple[int, int], block_columns: int) -> list[slice]:
+    """Slices of rows that together are all rows of a scene, in blocks of so many columns or fewer.
+
+    Parameters
+    ----------
+    shape
+        Numbers of rows and columns of the scene. [-]
+    block_columns
+        Atmospheric columns in memory at a time; a block has one row at least. [-]
+    """
+    num_rows = max(1, block_columns // shape[1])
+    return [slice(y, min(y + num_rows, shape[0])) for y in range(0, shape[0], num_rows)]
+
+
+def run(
+    read_block: ReadBlock,
+    times: np.ndarray,
+    shape: tuple[int, int],
+    write_block: WriteBlock,
+    *,
+    num_streams: int = 8,
+    chunk_columns: int = 1024,
+    block_columns: int = 16384,
+    progress: bool = True,
+) -> dict[str, Attribute]:
+    """Simulate all times of a scene with one block of rows in memory.
+
+    Parameters
+    ----------
+    read_block
+        Returns the scenario of a block, given the index of the time and the rows.
+    times
+        Times of the scene.
+    shape
+        Numbers of rows and columns of the scene. [-]
+    write_block
+        Takes the index of the time, the rows and the block's result.
+    num_streams, chunk_columns
+        As in `simulate`.
+    block_columns
+        Atmospheric columns in memory at a time. [-]
+    progress
+        Whether to show how many columns are done, where a terminal looks on.
+
+    Returns
+    -------
+    Attributes that account for the whole scene (`add_accounts`).
+    """
+    account: dict[str, Attribute] = {}
+    total = len(times) * shape[0] * shape[1]
+    with tqdm(total=total, unit="columns", disable=None if progress else True) as bar:
+        for time_index in range(len(times)):
+            for rows in row_blocks(shape, block_columns):
+                result = simulate(
+                    read_block(time_index, rows),
+                    num_streams=num_streams,
+                    chunk_columns=chunk_columns,
+                )
+                write_block(time_index, rows, result)
+                account = add_accounts([account, result.attrs])
+                bar.update(result.sizes["y"] * result.sizes["x"])
+    return account

@@ -1,0 +1,100 @@
+"""Which albedo the ground of a column gets."""
+
+import numpy as np
+import pytest
+
+from abi_operator.files import InputError
+from abi_operator.scene import check_ground
+from abi_operator.scene.albedo import surface_albedo
+
+BANDS = ("C01", "C03")
+
+
+def test_the_nearest_cell_is_taken(make_model, make_albedo):
+    values, source = surface_albedo(make_model(), BANDS, make_albedo(), None)
+    np.testing.assert_allclose(values[0], [[0.2, 0.3]] * 3)
+    np.testing.assert_allclose(values[1], [[0.22, 0.32]] * 3)
+    assert source == "nearest cell of the albedo file's 2007-10-24"
+
+
+def test_the_order_of_latitudes_and_the_count_of_longitudes_do_not_matter(make_model, make_albedo):
+    model, albedo = make_model(), make_albedo()
+    albedo["surface_albedo"][..., 0, :] = 0.7  # the northernmost row, 33.4 N
+    model["latitude"] += 0.15
+    expected, _ = surface_albedo(model, BANDS, albedo, None)
+    assert (expected[0, -1] == 0.7).all() and (expected[0, 0] < 0.5).all()
+    for same in (
+        albedo.isel(lat=slice(None, None, -1)),
+        albedo.assign_coords(lon=albedo.lon + 360),
+    ):
+        np.testing.assert_array_equal(surface_albedo(model, BANDS, same, None)[0], expected)
+
+
+def test_the_nearest_date_is_taken(make_model, make_albedo):
+    albedo = make_albedo(dates=("2007-10-24", "2007-10-08"))
+    albedo["surface_albedo"][:, 1] = 0.9
+    values, _ = surface_albedo(make_model(), BANDS, albedo, None)
+    assert (values < 0.5).all()
+
+
+def test_a_date_far_away_is_warned_of(make_model, make_albedo):
+    with pytest.warns(UserWarning, match="2007-10-01, is 23 days away from the scene"):
+        surface_albedo(make_model(), BANDS, make_albedo(dates=("2007-10-01",)), None)
+
+
+def test_water_of_the_land_mask_is_ocean(make_model, make_albedo):
+    values, source = surface_albedo(make_model(), BANDS, make_albedo(), 0.06)
+    np.testing.assert_allclose(values[0], [[0.06, 0.3]] * 3)
+    assert source.endswith("water 0.06")
+
+
+def test_land_without_inversion_stays_without_albedo(make_model, make_albedo):
+    albedo = make_albedo()
+    albedo["surface_albedo"][..., 2] = np.nan
+    values, _ = surface_albedo(make_model(), BANDS, albedo, 0.06)
+    assert (values[:, :, 0] == 0.06).all() and np.isnan(values[:, :, 1]).all()
+
+
+def test_without_a_mask_ocean_fills_what_the_file_lacks(make_model, make_albedo):
+    albedo = make_albedo()
+    albedo["surface_albedo"][..., 2] = np.nan
+    values, _ = surface_albedo(make_model(land_mask=None), BANDS, albedo, 0.06)
+    np.testing.assert_allclose(values[0], [[0.2, 0.06]] * 3)
+
+
+def test_a_column_with_some_bands_is_not_made_ocean(make_model, make_albedo):
+    albedo = make_albedo()
+    albedo["surface_albedo"][0, ..., 2] = np.nan
+    values, _ = surface_albedo(make_model(land_mask=None), BANDS, albedo, 0.06)
+    assert np.isnan(values[0, :, 1]).all() and (values[1, :, 1] > 0.3).all()
+
+
+def test_without_file_or_mask_all_is_ocean(make_model):
+    values, _ = surface_albedo(make_model(land_mask=None), BANDS, None, 0.06)
+    assert (values == 0.06).all()
+
+
+def test_without_file_land_of_the_mask_has_no_albedo(make_model):
+    values, _ = surface_albedo(make_model(), BANDS, None, 0.06)
+    assert (values[..., 0] == 0.06).all() and np.isnan(values[..., 1]).all()
+
+
+def test_some_albedo_must_be_named(make_model):
+    with pytest.raises(InputError, match="name an albedo file, an albedo of the ocean, or both"):
+        surface_albedo(make_model(), BANDS, None, None)
+
+
+def test_a_file_that_ends_within_the_scene_is_refused(make_model, make_albedo):
+    message = (
+        r"from 33.00 to 33.20 N and -117.00 to -116.90 E, but the albedo file only from 32.70 to "
+        r"33.10 N and -117.15 to -116.85 E"
+    )
+    with pytest.raises(InputError, match=message):
+        check_ground(make_model(), make_albedo(lat=(33.0, 32.8)), None)
+
+
+def test_water_with_its_own_albedo_needs_no_file(make_model, make_albedo):
+    albedo = make_albedo(lon=(-116.9, -116.8))
+    check_ground(make_model(), albedo, 0.06)
+    with pytest.raises(InputError, match="request albedo for the whole scene"):
+        check_ground(make_model(), albedo, None)

@@ -1,0 +1,59 @@
+"""States of columns, from scenarios of either layout."""
+
+import jax
+import numpy as np
+import pytest
+import xarray as xr
+
+from abi_operator import smoke
+from abi_operator.scene import PlumeSpecification, column_states, scenario
+
+BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
+
+
+@pytest.fixture
+def made(make_model):
+    plumes = {"smoke": PlumeSpecification(smoke(1.2), BRIGHTNESS)}
+    return scenario(make_model(), ocean_albedo=0.06, plumes=plumes)
+
+
+def test_a_state_holds_what_the_scenario_says_of_its_column(made):
+    states = column_states(made, ("C01", "C06"))
+    state = jax.tree.map(lambda leaf: leaf[3], states)  # y = 1, x = 1
+    column = made.isel(y=1, x=1)
+    np.testing.assert_array_equal(state.atmosphere.pressure, column["pressure"])
+    np.testing.assert_array_equal(state.atmosphere.height, column["height"])
+    np.testing.assert_array_equal(state.atmosphere.liquid.mass_path, column["liquid_mass_path"])
+    np.testing.assert_array_equal(state.atmosphere.liquid.number_path, column["liquid_number_path"])
+    assert list(state.albedo) == ["C01", "C06"]
+    np.testing.assert_array_equal(state.albedo["C06"], column["surface_albedo"].sel(band="C06"))
+    geometry = state.geometry
+    np.testing.assert_allclose(np.degrees(geometry.solar_zenith), column["solar_zenith_angle"])
+    np.testing.assert_allclose(np.degrees(geometry.view_zenith), column["view_zenith_angle"])
+    relative = np.degrees(geometry.relative_azimuth)
+    np.testing.assert_allclose(relative, column["relative_azimuth_angle"])
+    plume = state.atmosphere.plumes["smoke"]
+    np.testing.assert_allclose(plume.aod_550, 1.2 * BRIGHTNESS[1, 1])
+    assert plume.ssa["C06"] == made["smoke_ssa"].sel(band="C06")
+
+
+def test_every_leaf_has_a_leading_column_axis(made):
+    for leaf in jax.tree.leaves(column_states(made)):
+        assert isinstance(leaf, np.ndarray) and leaf.shape[0] == 6
+
+
+def test_one_column_dimension_serves_as_well_as_two(made):
+    stacked = made.drop_vars("time").stack(column=("y", "x")).reset_index("column")
+    one, two = column_states(stacked), column_states(made)
+    jax.tree.map(np.testing.assert_array_equal, one, two)
+
+
+def test_plumes_may_differ_from_column_to_column(made):
+    top = xr.DataArray([[3000.0, 3100.0]] * 3, dims=("y", "x"))
+    states = column_states(made.assign(smoke_top=top))
+    np.testing.assert_array_equal(states.atmosphere.plumes["smoke"].top, top.values.ravel())
+
+
+def test_unknown_bands_are_refused(made):
+    with pytest.raises(ValueError, match="'C04'"):
+        column_states(made, ("C04",))

@@ -1,0 +1,118 @@
+"""Simulated scenes: what they contain, where they are undefined, and how they are cut."""
+
+import numpy as np
+import pytest
+
+from abi_operator import brf, smoke
+from abi_operator.nomenclature import QUALITY_FLAGS, RESULT
+from abi_operator.scene import (
+    PlumeSpecification,
+    column_states,
+    row_blocks,
+    run,
+    scenario,
+    simulate,
+)
+
+BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
+OPTIONS = {"num_streams": 2, "chunk_columns": 4}
+# Sums in another order, as chunks of columns of other sizes are compiled to other programs.
+ROUNDING = 1e-10
+
+
+@pytest.fixture
+def made(make_model):
+    """Two bands of a small scene with cloud, smoke and ocean everywhere."""
+    plumes = {"smoke": PlumeSpecification(smoke(1.2, bands=("C01", "C03")), BRIGHTNESS)}
+    model = make_model(land_mask=None)
+    return scenario(model, ocean_albedo=0.06, plumes=plumes, bands=("C01", "C03"))
+
+
+def test_a_result_is_the_scenario_with_reflectances_and_depths(made):
+    result = simulate(made, **OPTIONS)
+    added = {*RESULT, "smoke_optical_depth", "smoke_aod_550"}
+    assert set(result.variables) == {*made.variables, *added}
+    assert set(made.data_vars).isdisjoint(added)
+    for name, entry in RESULT.items():
+        assert result[name].dims == entry.dims and np.isfinite(result[name]).all()
+    mu0 = np.cos(np.radians(made["solar_zenith_angle"].values))
+    np.testing.assert_allclose(
+        result["reflectance_factor"], mu0 * result["brf"].values, rtol=ROUNDING
+    )
+    np.testing.assert_allclose(result["smoke_aod_550"], 1.2 * BRIGHTNESS, rtol=ROUNDING)
+    extinction = made["smoke_relative_extinction"]
+    np.testing.assert_allclose(
+        result["smoke_optical_depth"], extinction * result["smoke_aod_550"], rtol=ROUNDING
+    )
+    cloud = result["liquid_optical_depth"].values
+    assert (cloud[..., 0] > 1).all() and (cloud[..., 1] == 0).all()
+    air = 0.18411 * made["pressure"].isel(level=-1) / 101325.0  # Bodhaine et al. (1999)
+    np.testing.assert_allclose(result["rayleigh_optical_depth"].sel(band="C01"), air, rtol=1e-4)
+
+
+def test_chunks_and_one_shot_agree(made):
+    direct = brf(column_states(made, ("C01", "C03")), ("C01", "C03"), num_streams=2)
+    chunked = simulate(made, **OPTIONS)["brf"].values
+    np.testing.assert_allclose(np.moveaxis(chunked, 0, -1).reshape(6, 2), direct, rtol=ROUNDING)
+
+
+def test_bands_can_be_chosen(made):
+    one = simulate(made, bands=("C03",), **OPTIONS)
+    assert one["band"].values.tolist() == ["C03"]
+    both = simulate(made, **OPTIONS)
+    np.testing.assert_allclose(one["brf"], both["brf"].sel(band=["C03"]), rtol=ROUNDING)
+
+
+def test_flagged_pixels_are_not_solved(made):
+    full = simulate(made, **OPTIONS)
+    night, missing = QUALITY_FLAGS["night"], QUALITY_FLAGS["no_albedo"]
+    unseen, grazing = QUALITY_FLAGS["out_of_sight"], QUALITY_FLAGS["grazing_sun"]
+    flags = [[night, missing], [unseen, grazing], [night | unseen, night | missing]]
+    made["quality_flag"] = ("y", "x"), np.array(flags, np.uint8)
+    made["surface_albedo"][:, 0, 1] = np.nan
+    made["solar_zenith_angle"][0, 0] = 95.0
+    result = simulate(made, **OPTIONS)
+    for band in (0, 1):
+        factor = result["reflectance_factor"].values[band]
+        solved = full["reflectance_factor"].values[band, 1, 1]
+        nan = np.nan
+        np.testing.assert_allclose(factor, [[0, nan], [nan, solved], [nan, 0]], rtol=ROUNDING)
+        value = result["brf"].values[band]
+        assert np.isfinite(value).tolist() == [[False, False], [False, True], [False, False]]
+
+
+def test_a_scene_by_night_is_dark(make_model):
+    night = make_model(land_mask=None).assign_coords(time=np.datetime64("2007-10-23T08:00", "ns"))
+    made = scenario(night, ocean_albedo=0.06, bands=("C01",))
+    assert (made["quality_flag"] == QUALITY_FLAGS["night"]).all()
+    result = simulate(made, **OPTIONS)
+    assert (result["reflectance_factor"] == 0).all() and np.isnan(result["brf"]).all()
+    assert (result["rayleigh_optical_depth"] > 0.1).all()
+
+
+def test_a_run_goes_through_all_times_and_rows(made):
+    written = {}
+    times = np.array(["2007-10-23T18:00", "2007-10-23T18:30"], "datetime64[ns]")
+
+    def read(time_index, rows):
+        block = made.isel(y=rows).assign_coords(time=times[time_index])
+        return block.assign_attrs(assumed_droplet_number_count=1)
+
+    def write(time_index, rows, result):
+        written[time_index, rows.start] = result
+
+    account = run(read, times, (3, 2), write, block_columns=4, progress=False, **OPTIONS)
+    assert list(written) == [(0, 0), (0, 2), (1, 0), (1, 2)]
+    assert account["assumed_droplet_number_count"] == 4
+    assert account["num_streams"] == 2
+    whole = simulate(made, **OPTIONS)
+    for (time_index, start), result in written.items():
+        assert result["time"] == times[time_index]
+        part = whole.isel(y=slice(start, start + 2))
+        np.testing.assert_allclose(result["brf"], part["brf"], rtol=ROUNDING)
+
+
+def test_blocks_of_rows_cover_a_scene():
+    assert row_blocks((5, 10), 20) == [slice(0, 2), slice(2, 4), slice(4, 5)]
+    assert row_blocks((2, 10), 5) == [slice(0, 1), slice(1, 2)]
+    assert row_blocks((2, 10), 1000) == [slice(0, 2)]

@@ -1,0 +1,232 @@
+"""The command line, on the demonstration's files and on broken ones."""
+
+import os
+import shutil
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import jax.numpy as jnp
+import netCDF4
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from abi_operator import cli, scene, simulation
+from abi_operator.demo import write_demo
+from abi_operator.files import InputError, read_result
+from abi_operator.nomenclature import QUALITY_FLAGS
+
+SIZE = 8
+
+
+@pytest.fixture
+def invoke(monkeypatch):
+    """A function that runs the command line as if no other package added to it, or these."""
+
+    def run(*arguments, entries=()):
+        def entry_points(group, name=None):
+            assert group == "abi_operator.commands"
+            return [entry for entry in entries if name in (None, entry.name)]
+
+        monkeypatch.setattr(cli, "entry_points", entry_points)
+        return CliRunner().invoke(cli.make_app(), [str(argument) for argument in arguments])
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def demo_files(tmp_path_factory):
+    return write_demo(tmp_path_factory.mktemp("inputs"), size=SIZE)
+
+
+@pytest.fixture
+def inputs(demo_files, tmp_path):
+    """Copies of the demonstration's inputs, to be broken."""
+    (tmp_path / "inputs").mkdir()
+    return type(demo_files)(*(Path(shutil.copy(path, tmp_path / "inputs")) for path in demo_files))
+
+
+def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
+    out = tmp_path / "made" / "demo"
+    outcome = invoke("demo", "--size", SIZE, "--out", out)
+    assert outcome.exit_code == 0, outcome.output
+    picture = "natural_color_2007-10-23T180000.png"
+    assert sorted(path.name for path in out.iterdir()) == ["inputs", picture, "result.nc"]
+    assert f"wrote {out / 'result.nc'}" in outcome.output
+    assert "64 pixels; flagged: none" in outcome.output
+    with read_result(out / "result.nc") as result:
+        assert result.sizes["time"] == 1 and result.sizes["band"] == 4
+        assert result["brf"].dtype == np.float64 and np.isfinite(result["brf"]).all()
+        assert result["smoke_aod_550"].max() <= 2.0
+        assert result.attrs["wrf_file"].startswith("wrfout_")
+        assert "US Standard Atmosphere 1976" in result.attrs["air_above_model"]
+    with Image.open(out / picture) as image:
+        assert image.size == (512, 512)
+
+
+def test_a_result_is_all_that_the_operator_needs(invoke, tmp_path):
+    """A result that is read back and simulated again is the same result."""
+    invoke("demo", "--size", SIZE, "--out", tmp_path)
+    with read_result(tmp_path / "result.nc") as result:
+        stored = result.isel(time=0).load()
+    again = scene.simulate(stored)
+    for name in ("brf", "reflectance_factor", "smoke_optical_depth"):
+        np.testing.assert_array_equal(again[name], stored[name])
+
+
+def test_simulate_does_what_demo_does(invoke, tmp_path, inputs):
+    paths = {"--albedo": inputs.albedo, "--plume": inputs.plume, "--out": tmp_path / "out"}
+    options = [word for option, path in paths.items() for word in (option, path)]
+    outcome = invoke("simulate", inputs.wrf, "--ocean-albedo", 0.03, *options)
+    assert outcome.exit_code == 0, outcome.output
+    invoke("demo", "--size", SIZE, "--out", tmp_path / "demo")
+    with read_result(tmp_path / "out" / "result.nc") as ours:
+        with read_result(tmp_path / "demo" / "result.nc") as theirs:
+            np.testing.assert_array_equal(ours["brf"], theirs["brf"])
+
+
+def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
+    options = ["--plume", inputs.plume, "--plume-species", "ash", "--plume-aod", 0.5]
+    options += ["--bands", "C01, C06", "--num-streams", 2, "--satellite-longitude", -137]
+    out = tmp_path / "out"
+    outcome = invoke("simulate", inputs.wrf, "--ocean-albedo", 0.03, *options, "--out", out)
+    assert outcome.exit_code == 0, outcome.output
+    assert "warning: no pictures were drawn: they need C01, C02, C03." in outcome.output
+    assert "flagged: no_albedo" in outcome.output
+    with read_result(out / "result.nc") as result:
+        assert result["band"].values.tolist() == ["C01", "C06"]
+        assert float(result["ash_aod_550"].max()) == pytest.approx(0.5, rel=0.01)
+        assert result.attrs["satellite_longitude"] == -137.0
+        land = result["quality_flag"].values == QUALITY_FLAGS["no_albedo"]
+        assert (np.isnan(result["brf"].values).all(axis=1) == land).all()
+
+
+def without(path, name):
+    """Rename a variable of a file, so that it has no `name`."""
+    with netCDF4.Dataset(path, "a") as file:
+        file.renameVariable(name, f"not_{name}")
+
+
+def shift(path, degrees):
+    """Move an albedo file to the east."""
+    with netCDF4.Dataset(path, "a") as file:
+        file["lon"][:] += degrees
+
+
+def shrink(path):
+    """Make a picture smaller than the grid."""
+    Image.new("L", (SIZE - 1, SIZE)).save(path)
+
+
+@pytest.mark.parametrize(
+    ("breaks", "sentence"),
+    [
+        (lambda inputs: inputs.wrf.unlink(), "does not exist"),
+        (lambda inputs: inputs.albedo.unlink(), "does not exist"),
+        (lambda inputs: inputs.plume.unlink(), "does not exist"),
+        (lambda inputs: inputs.wrf.write_text("no NetCDF"), "cannot be read as NetCDF"),
+        (lambda inputs: without(inputs.wrf, "QCLOUD"), "has no QCLOUD"),
+        (
+            lambda inputs: without(inputs.albedo, "BRDF_Albedo_Parameters_Band3"),
+            "has no BRDF_Albedo_Parameters_Band3",
+        ),
+        (lambda inputs: shift(inputs.albedo, 2.0), "request albedo for the whole scene"),
+        (lambda inputs: shrink(inputs.plume), "is 7 x 8 pixels where the model's grid is 8 x 8"),
+    ],
+)
+def test_wrong_inputs_are_said_in_one_sentence(invoke, tmp_path, inputs, breaks, sentence):
+    breaks(inputs)
+    options = ["--albedo", inputs.albedo, "--plume", inputs.plume, "--ocean-albedo", 0.06]
+    outcome = invoke("simulate", inputs.wrf, *options, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2
+    assert sentence in outcome.stderr and outcome.stdout == ""
+    assert outcome.stderr.startswith("abi-operator: ") and outcome.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
+
+
+def test_some_albedo_is_needed(invoke, tmp_path, inputs):
+    outcome = invoke("simulate", inputs.wrf, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2
+    assert "name an albedo file, an albedo of the ocean, or both" in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monkeypatch):
+    def write_png(path, rgb):
+        raise InputError("a value is wrong.")
+
+    monkeypatch.setattr(simulation, "write_png", write_png)
+    options = ["--ocean-albedo", 0.06, "--num-streams", 2]
+    outcome = invoke("simulate", inputs.wrf, *options, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2 and outcome.stderr == "abi-operator: a value is wrong.\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--num-streams", "7"], "the number of streams is even"),
+        (["--bands", "C01,C04"], "'C04'"),
+        (["--ocean-albedo", "1.5"], "--ocean-albedo"),
+        (["--plume-species", "dust"], "'dust' is not one of"),
+    ],
+)
+def test_wrong_options_are_refused(invoke, tmp_path, inputs, options, message):
+    outcome = invoke("simulate", inputs.wrf, *options, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2 and message in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_other_packages_add_commands_and_finish_the_demo(invoke, tmp_path, capsys):
+    module = f"{__name__}:"
+    entries = [
+        EntryPoint("greet", module + "greet", "abi_operator.commands"),
+        EntryPoint("demo", module + "finish_demo", "abi_operator.commands"),
+        EntryPoint("broken", "no_such_module_anywhere:command", "abi_operator.commands"),
+    ]
+    outcome = invoke("greet", entries=entries)
+    assert outcome.exit_code == 0 and outcome.stdout == "float64\n"
+    assert capsys.readouterr().err == (
+        "note: broken of no_such_module_anywhere is not available "
+        "(No module named 'no_such_module_anywhere')\n"
+    )
+    outcome = invoke("demo", "--size", SIZE, "--out", tmp_path / "demo", entries=entries)
+    assert outcome.exit_code == 0, outcome.output
+    assert outcome.stdout.endswith(
+        "finished with ['inputs', 'natural_color_2007-10-23T180000.png', 'result.nc']\n"
+    )
+
+
+def greet() -> None:
+    """A command of another package."""
+    print(jnp.ones(1).dtype)
+
+
+def finish_demo(folder: Path) -> None:
+    """Another package's last step of the demonstration."""
+    print("finished with", sorted(path.name for path in folder.iterdir()))
+
+
+@pytest.mark.real
+def test_hurricane_katrina(invoke, tmp_path):
+    """All four times of a real WRF file, the first of them at sunrise."""
+    folder = os.environ.get("ABI_OPERATOR_SAMPLE_DATA")
+    if not folder:
+        pytest.skip("ABI_OPERATOR_SAMPLE_DATA names no folder of real files")
+    wrf = Path(folder) / "wrf_mercator_sample.nc"
+    out = tmp_path / "out"
+    options = ["--ocean-albedo", 0.06, "--num-streams", 4]
+    outcome = invoke("simulate", wrf, *options, "--out", out)
+    assert outcome.exit_code == 0, outcome.output
+    assert "warning: rain of the model is not simulated" in outcome.stderr
+    assert "cloud water below 0 C is ice in this model's microphysics (WSM3)" in outcome.stderr
+    assert len(list(out.glob("natural_color_*.png"))) == 4
+    with read_result(out / "result.nc") as result:
+        grazing = (result["quality_flag"] & QUALITY_FLAGS["grazing_sun"]) > 0
+        assert grazing.isel(time=0).all() and not grazing.isel(time=slice(1, None)).any()
+        assert (result["solar_zenith_angle"] < 90).all()
+        assert np.isfinite(result["brf"]).all() and np.isfinite(result["reflectance_factor"]).all()
+        assert float(result["brf"].min()) > 0 and float(result["brf"].max()) < 1.3
+        assert (result["pressure"].isel(level=0) == 0).all()
+        assert 45000 < result.attrs["smallest_model_top_pressure"] < 51400
