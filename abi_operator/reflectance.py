@@ -94,7 +94,7 @@ def reflectance_factor(
 
 
 def _uniform(state: State) -> tuple[State, tuple[int, ...]]:
-    """Give all leaves one floating type; return the batch's shape and check that leaves share it."""
+    """Give all leaves one floating type, and check that they share the batch's shape."""
     leaves = jax.tree.leaves(state)
     arrays = [x for x in leaves if hasattr(x, "dtype")]
     dtype = jax.dtypes.canonicalize_dtype(np.result_type(*(x.dtype for x in arrays), np.float16))

@@ -10,6 +10,7 @@ wrong with a file is an `InputError`, one sentence that can be shown to the user
 from .atomic import output_folder as output_folder
 from .errors import InputError as InputError
 from .mcd43 import read_mcd43a1 as read_mcd43a1
+from .mcd43 import read_white_sky as read_white_sky
 from .plume import read_plume as read_plume
 from .result import ResultWriter as ResultWriter
 from .result import read_result as read_result

@@ -21,6 +21,55 @@ VARIABLE_MAP = {
 _PARAMETERS, _QUALITY = VARIABLE_MAP
 _GRID = ("time", "lat", "lon")
 _NO_INVERSION = 255
+_QUALITY_ATTRIBUTES = {
+    "flag_values": np.array([0, 1, _NO_INVERSION], np.uint8),
+    "flag_meanings": "full_inversion magnitude_inversion no_inversion",
+}
+
+
+def read_white_sky(path: FilePath, modis_bands: Sequence[str]) -> xr.Dataset:
+    """Read white-sky albedo in bands of MODIS itself from an AppEEARS file of MCD43A1.
+
+    Parameters
+    ----------
+    path
+        The file.
+    modis_bands
+        ``"Band1"`` to ``"Band7"``, ``"vis"``, ``"nir"`` or ``"shortwave"``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``white_sky_albedo`` (modis_band, time, lat, lon) [-], f_iso + 0.189184 f_vol - 1.377622
+        f_geo, NaN where the file has none, and ``albedo_quality``, the mandatory quality.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read or lacks one of the bands.
+    """
+    with open_netcdf(path) as file:
+        lacking = [_PARAMETERS + name for name in modis_bands if _PARAMETERS + name not in file]
+        if lacking:
+            raise InputError(f"{path} has no {', '.join(lacking)}; request them from AppEEARS.")
+        white_sky, quality, coordinates, num_invalid = _read(file, tuple(modis_bands), path)
+    dims = ("modis_band", *_GRID)
+    attributes = {
+        "units": "1",
+        "long_name": "white-sky albedo of the ground",
+        "num_outside_valid_range": num_invalid,
+    }
+    return xr.Dataset(
+        {
+            "white_sky_albedo": (dims, np.stack([white_sky[n] for n in modis_bands]), attributes),
+            "albedo_quality": (
+                dims,
+                np.stack([quality[n] for n in modis_bands]),
+                _QUALITY_ATTRIBUTES,
+            ),
+        },
+        coords={"modis_band": list(modis_bands), **coordinates},
+    )
 
 
 def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = False) -> xr.Dataset:
@@ -52,20 +101,8 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
     bands = check_bands(bands)
     with open_netcdf(path) as file:
         regressions = _choose_regressions(file, bands, broadband, path)
-        used = dict.fromkeys(name for r in regressions for name in r.weights)
-        require_variables(
-            file,
-            ["time", "lat", "lon", *(_QUALITY + name for name in used)],
-            path,
-            "request the area from AppEEARS in NetCDF format, with its quality layers",
-        )
-        grid = {name: _axis(file, name, path) for name in ("lat", "lon")}
-        time = ("time", _times(file, path), {"standard_name": "time"})
-        white_sky, quality, num_invalid = {}, {}, 0
-        for name in used:
-            white_sky[name], invalid = _white_sky_albedo(file, name, path)
-            quality[name] = _quality(file, name, path)
-            num_invalid += invalid
+        used = tuple(dict.fromkeys(name for r in regressions for name in r.weights))
+        white_sky, quality, coordinates, num_invalid = _read(file, used, path)
     albedo = np.stack(
         [r.offset + sum(w * white_sky[n] for n, w in r.weights.items()) for r in regressions]
     )
@@ -80,19 +117,37 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
             for band, r in zip(bands, regressions, strict=True)
         ),
     }
-    quality_attributes = {
-        "long_name": "worst mandatory quality of the MODIS bands used",
-        "flag_values": np.array([0, 1, _NO_INVERSION], np.uint8),
-        "flag_meanings": "full_inversion magnitude_inversion no_inversion",
+    quality_attributes = _QUALITY_ATTRIBUTES | {
+        "long_name": "worst mandatory quality of the MODIS bands used"
     }
     return xr.Dataset(
         {
             "surface_albedo": (("band", *_GRID), albedo, albedo_attributes),
             "albedo_quality": (("band", *_GRID), worst, quality_attributes),
         },
-        coords={"band": list(bands), "time": time, **grid},
+        coords={"band": list(bands), **coordinates},
         attrs={key: file.attrs[key] for key in ("title", "source") if key in file.attrs},
     )
+
+
+def _read(
+    file: xr.Dataset, names: tuple[str, ...], path: FilePath
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict, int]:
+    """White-sky albedo and quality of MODIS bands, coordinates, and invalid kernel weights."""
+    require_variables(
+        file,
+        ["time", "lat", "lon", *(_QUALITY + name for name in names)],
+        path,
+        "request the area from AppEEARS in NetCDF format, with its quality layers",
+    )
+    coordinates: dict = {name: _axis(file, name, path) for name in ("lat", "lon")}
+    coordinates["time"] = ("time", _times(file, path), {"standard_name": "time"})
+    white_sky, quality, num_invalid = {}, {}, 0
+    for name in names:
+        white_sky[name], invalid = _white_sky_albedo(file, name, path)
+        quality[name] = _quality(file, name, path)
+        num_invalid += invalid
+    return white_sky, quality, coordinates, num_invalid
 
 
 def _choose_regressions(

@@ -54,7 +54,7 @@ class ModeKernels(eqx.Module):
 def node_functions(num_streams: int, num_modes: int) -> np.ndarray:
     """Legendre functions of the nodes times sqrt(w / mu), axes ``mode degree node``, float64."""
     mu, weight = double_gauss(num_streams)
-    return associated_legendre(num_modes, num_streams, mu) * np.sqrt(weight / mu)
+    return np.asarray(associated_legendre(num_modes, num_streams, mu)) * np.sqrt(weight / mu)
 
 
 def layer_matrix(

@@ -32,8 +32,8 @@ def associated_legendre(
     mu
         Cosines; NumPy arrays are evaluated by NumPy, in their own precision. [-]
     """
-    xp, root = (np, np.sqrt) if isinstance(mu, np.ndarray) else (jnp, safe_sqrt)
-    sine = root(1 - mu * mu)
+    xp = np if isinstance(mu, np.ndarray) else jnp
+    sine = np.sqrt(1 - mu * mu) if isinstance(mu, np.ndarray) else safe_sqrt(1 - mu * mu)
     diagonal = [xp.ones_like(mu)]
     for m in range(1, num_modes):
         diagonal.append(diagonal[-1] * sine * np.sqrt((2 * m - 1) / (2 * m)).item())

@@ -5,6 +5,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from .._batching import map_tiles, tile_size
@@ -145,7 +146,7 @@ def _check(arrays, num_streams, num_modes, delta_m, single_scattering) -> None:
 
 def _doublings(arrays: list, num_streams: int) -> int:
     tau, mu0, mu = arrays[0], arrays[4], arrays[5]
-    if any(isinstance(x, jax.core.Tracer) for x in (tau, mu0, mu)) or tau.size == 0:
+    if any(isinstance(x, Tracer) for x in (tau, mu0, mu)) or tau.size == 0:
         return UNKNOWN
     min_mu = min(float(np.min(mu0)), float(np.min(mu)))
     return sufficient_doublings(float(np.max(tau)), min_mu, num_streams)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abi_operator.files import InputError, read_mcd43a1
+from abi_operator.files import InputError, read_mcd43a1, read_white_sky
 from abi_operator.files.modis_bands import MODIS_TO_ABI
 
 FILL = 32767
@@ -172,3 +172,18 @@ def test_real_file_with_broadband_and_julian_days(sample_data: Path):
     assert float(albedo.sel(band="C03").min()) == pytest.approx(0.005324288, rel=1e-6)
     assert albedo.attrs["num_outside_unit_interval"] == 0
     np.testing.assert_array_equal(dataset["albedo_quality"] == 255, np.isnan(albedo))
+
+
+@pytest.mark.real
+def test_real_file_has_three_broad_bands(sample_data: Path):
+    """Snow-free Texas in January: plants are dark in the visible and bright beyond."""
+    path = sample_data / "MCD43A1.006_aid0001.nc"
+    names = ["vis", "nir", "shortwave"]
+    dataset = read_white_sky(path, names)
+    albedo = dataset["white_sky_albedo"]
+    assert albedo.shape == (3, 31, 48, 54)
+    vis, nir, shortwave = (float(albedo.sel(modis_band=n).median()) for n in names)
+    assert 0.02 < vis < shortwave < nir < 0.4
+    np.testing.assert_array_equal(dataset["albedo_quality"] == 255, np.isnan(albedo))
+    with pytest.raises(InputError, match="no BRDF_Albedo_Parameters_Band7; request"):
+        read_white_sky(path, ["vis", "Band7"])
