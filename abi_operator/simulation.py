@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import netCDF4
 import numpy as np
 import xarray as xr
 
@@ -173,10 +172,9 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
             num_streams=request.num_streams,
             block_columns=_BLOCK_COLUMNS,
         )
-    files = {"wrf": request.wrf, "albedo": request.albedo, "plume": request.plume}
-    account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
-    with netCDF4.Dataset(folder / RESULT, "a") as file:  # the whole scene is known only now
-        file.setncatts(account)
+        files = {"wrf": request.wrf, "albedo": request.albedo, "plume": request.plume}
+        account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
+        writer.add_attributes(account)
     with read_result(folder / RESULT) as result:
         pictures = _draw(result, folder)
         return Report([RESULT, *pictures], [*_flag_lines(result), *_account_lines(account)])

@@ -170,7 +170,9 @@ def _choose_regressions(
         else:
             lacking += missing
             if missing and stand_in is not None and not broadband:
-                remedy = ", or allow broadband albedo to stand in for C01, C02 and C03"
+                remedy = (
+                    ", or let broadband albedo stand in for C01, C02 and C03 (option broadband)"
+                )
         chosen.append(regression)
     if lacking:
         raise InputError(

@@ -133,6 +133,10 @@ class ResultWriter:
             self._write_variable(name, time_index, rows, dataset[name].values, first)
         self._written[time_index, rows] = True
 
+    def add_attributes(self, attributes: Mapping[str, str | int | float]) -> None:
+        """Add global attributes, such as those that are known only after the last block."""
+        self._file.setncatts(attributes)
+
     def _write_variable(
         self, name: str, time_index: int, rows: slice, values: np.ndarray, first: bool
     ) -> None:
