@@ -103,7 +103,7 @@ def test_missing_bands_are_named_and_the_remedy_too(write_albedo_twin):
     path = write_albedo_twin({"vis": weights(100)})
     message = (
         "has no BRDF_Albedo_Parameters_Band3, BRDF_Albedo_Parameters_Band2; "
-        "request these layers of MCD43A1 from AppEEARS, or allow broadband"
+        "request these layers of MCD43A1 from AppEEARS, or let broadband"
     )
     with pytest.raises(InputError, match=message):
         read_mcd43a1(path, ["C01", "C03"])

@@ -1,0 +1,77 @@
+"""The forward model of a retrieval: state vector in, reflectance factors out."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from abi_operator import BANDS, Atmosphere, State, reflectance_factor
+from abi_operator.optics import column_optics
+from abi_operator.solver import sufficient_doublings
+
+from .state_vector import StateVector
+
+
+class ForwardModel(eqx.Module):
+    """Reflectance factors of one column whose plume is given by x and everything else by a state.
+
+    Parameters
+    ----------
+    vector
+        Meaning of x.
+    bands
+        Bands that are measured.
+    num_streams, num_doublings
+        Settings of the solver; see `abi_operator.brf`. The doublings must suffice up to
+        ``vector.aod_limit``, which `prepared` takes care of.
+    species
+        Name of the plume that is retrieved.
+    """
+
+    vector: StateVector
+    bands: tuple[str, ...] = eqx.field(static=True)
+    num_streams: int = eqx.field(static=True, default=8)
+    num_doublings: int | None = eqx.field(static=True, default=None)
+    species: str = eqx.field(static=True, default="smoke")
+
+    def state(self, x: Float[Array, "*batch x"], state: State) -> State:
+        """Put x into a state."""
+        plume = self.vector.plume(x, state.atmosphere.plumes[self.species])
+        return eqx.tree_at(lambda s: s.atmosphere.plumes[self.species], state, plume)
+
+    def __call__(self, x: Float[Array, "*batch x"], state: State) -> Float[Array, "*batch band"]:
+        """Reflectance factors that the imager would see. [-]"""
+        return reflectance_factor(
+            self.state(x, state),
+            self.bands,
+            num_streams=self.num_streams,
+            num_doublings=self.num_doublings,
+        )
+
+
+def prepared(forward: ForwardModel, states: State) -> ForwardModel:
+    """Give a forward model doublings that suffice for every optical depth up to the limit.
+
+    Parameters
+    ----------
+    forward
+        The forward model.
+    states
+        Concrete columns, batched along one leading axis.
+    """
+    num_columns = states.geometry.solar_zenith.shape[0]
+    thickest = jnp.full((num_columns, forward.vector.size), jnp.inf)
+    thickest = thickest.at[:, 1:].set(0)
+    atmospheres = forward.state(thickest, states).atmosphere
+
+    def largest_tau(atmosphere: Atmosphere) -> Float[Array, ""]:
+        optics = [column_optics(atmosphere, BANDS[band]) for band in forward.bands]
+        return jnp.max(jnp.stack([jnp.max(layers.tau) for layers in optics]))
+
+    max_tau = jnp.max(jax.jit(jax.vmap(largest_tau))(atmospheres))
+    min_mu = min(np.min(states.geometry.mu0), np.min(states.geometry.mu))
+    num_doublings = sufficient_doublings(float(max_tau), float(min_mu), forward.num_streams)
+    return replace(forward, num_doublings=num_doublings)

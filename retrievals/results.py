@@ -1,0 +1,77 @@
+"""What became of each pixel, as one code with a message that says what to try."""
+
+import enum
+
+import numpy as np
+
+
+class ResultCode(enum.IntEnum):
+    """Result of a retrieval at one pixel; only ``SUCCESS`` vouches for the value."""
+
+    SUCCESS = 0
+    NO_PLUME = 1
+    UNUSABLE = 2
+    INVALID_INPUT = 3
+    NOT_CONVERGED = 4
+    NONFINITE = 5
+    POOR_FIT = 6
+    AMBIGUOUS = 7
+    NOT_OBSERVABLE = 8
+
+    @property
+    def message(self) -> str:
+        """One sentence for the user."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    ResultCode.SUCCESS: "Retrieved.",
+    ResultCode.NO_PLUME: (
+        "Not attempted: the plume mask has no smoke here; where='all' attempts every pixel."
+    ),
+    ResultCode.UNUSABLE: (
+        "Not attempted: quality_flag reports night, a grazing sun or view, or missing albedo."
+    ),
+    ResultCode.INVALID_INPUT: (
+        "Not attempted: reflectance or scenario is not finite here; repair the input."
+    ),
+    ResultCode.NOT_CONVERGED: (
+        "The number of steps ran out; allow more, or give a prior where there may be no smoke."
+    ),
+    ResultCode.NONFINITE: (
+        "The operator was not finite at an iterate; look for impossible values in the scenario."
+    ),
+    ResultCode.POOR_FIT: (
+        "No optical depth explains the reflectances; the ground, cloud or aerosol assumed may be "
+        "wrong, retrieve_ssa=True may help, or the smoke may be thicker than aod_limit."
+    ),
+    ResultCode.AMBIGUOUS: "Two optical depths explain the reflectances; add a band or a prior.",
+    ResultCode.NOT_OBSERVABLE: (
+        "The reflectances hardly depend on the smoke (ground or cloud near critical albedo, or "
+        "very thick smoke): the posterior error exceeds the expected error; add a band or a prior."
+    ),
+}
+
+
+def flag_attributes() -> dict[str, object]:
+    """CF attributes of a variable that holds result codes."""
+    return {
+        "flag_values": np.array([code.value for code in ResultCode], np.int8),
+        "flag_meanings": " ".join(code.name.lower() for code in ResultCode),
+        "comment": " ".join(f"{code.name.lower()}: {code.message}" for code in ResultCode),
+    }
+
+
+def expected_error(aod_550: np.ndarray) -> np.ndarray:
+    """Expected error of aerosol optical depth over land, 0.05 + 0.15 aod_550 [1]_. [-]
+
+    The envelope inside which two thirds of the retrievals of MODIS Dark Target lie: the yardstick
+    of scores, and the posterior error above which a retrieval is not a success.
+
+    References
+    ----------
+    .. [1] R. C. Levy et al., "Global evaluation of the Collection 5 MODIS dark-target aerosol
+       products over land", Atmos. Chem. Phys., 10, 10399-10420, 2010,
+       doi:10.5194/acp-10-10399-2010
+    """
+    return 0.05 + 0.15 * np.asarray(aod_550)

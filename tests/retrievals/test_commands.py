@@ -1,0 +1,69 @@
+"""The commands, as the command line calls them."""
+
+import numpy as np
+import pytest
+import typer
+import xarray as xr
+from typer.testing import CliRunner
+
+from abi_operator.files import InputError, ResultWriter
+from retrievals import ResultCode
+from retrievals.commands import finish_demo, retrieve, score
+
+
+@pytest.fixture
+def folder(tmp_path, simulated):
+    """A folder with the result of the scene."""
+    times = np.array(["2007-10-23T18:00"], "datetime64[ns]")
+    attributes = {"num_streams": simulated.attrs["num_streams"]}
+    with ResultWriter(
+        tmp_path / "result.nc", times=times, shape=(3, 4), attributes=attributes
+    ) as writer:
+        writer.write(0, slice(0, 3), simulated)
+    return tmp_path
+
+
+@pytest.fixture
+def run():
+    app = typer.Typer()
+    app.command("retrieve")(retrieve)
+    app.command("score")(score)
+    return lambda *arguments: CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_retrieve_and_score(folder, run):
+    out = folder / "new" / "smoke.nc"
+    answer = run("retrieve", folder / "result.nc", "--out", out)
+    assert answer.exit_code == 0, answer.output
+    with xr.open_dataset(out) as written:
+        assert written["result_code"].dtype == np.int8
+        assert written["aod_550"].dims == ("time", "y", "x")
+        assert written.attrs["Conventions"] == "CF-1.11"
+    csv = folder / "scores.csv"
+    answer = run("score", folder / "result.nc", out, "--csv", csv)
+    assert answer.exit_code == 0, answer.output
+    assert answer.output.split("\n")[0].split() == "N bias rmse max r slope inside EE".split()
+    assert "success: " in answer.output
+    assert csv.read_text().startswith("group,num_pairs,bias,rmse,max_error,")
+
+
+def test_the_demonstration_ends_with_scores(folder, capsys):
+    finish_demo(folder)
+    with xr.open_dataset(folder / "retrieval.nc") as written:
+        assert (written["result_code"] == ResultCode.SUCCESS).sum() >= 10
+    assert (folder / "scores.csv").is_file()
+    assert "inside EE" in capsys.readouterr().out
+
+
+def test_trouble_is_one_sentence(folder, run):
+    answer = run("retrieve", folder / "none.nc", "--out", folder / "x.nc")
+    assert answer.exit_code == 2 and "does not exist" in answer.stderr
+    answer = run("retrieve", folder / "result.nc", "--out", folder / "x.nc", "--bands", "C01,C06")
+    assert answer.exit_code == 2 and "no band C06" in answer.stderr
+    answer = run("retrieve", folder / "result.nc", "--out", folder / "x.nc", "--bands", "C99")
+    assert answer.exit_code == 2 and "C99" in answer.stderr
+    answer = run("score", folder / "result.nc", folder / "result.nc")
+    assert answer.exit_code == 2 and "no result_code" in answer.stderr
+    assert not (folder / "x.nc").exists()
+    with pytest.raises(InputError, match="does not exist"):
+        finish_demo(folder / "nowhere")

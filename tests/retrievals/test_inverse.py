@@ -1,0 +1,110 @@
+"""One pixel, and many at once."""
+
+from dataclasses import replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from retrievals.inverse import Minimiser, invert
+from retrievals.observation import Observation
+from retrievals.pixels import retrieve_pixels
+from retrievals.results import ResultCode
+from retrievals.smoke import BANDS
+from retrievals.state_vector import Prior
+
+# What a last step below the tolerance of 1e-6 leaves, times the derivative of optical depth.
+CONVERGED = 1e-8
+
+
+def pixel(tree, index):
+    return jax.tree.map(lambda x: jnp.asarray(x[index]), tree)
+
+
+@pytest.fixture(scope="module")
+def retrieved(columns, forward):
+    """All columns by the batch driver."""
+    observation, states, _ = columns
+    return retrieve_pixels(forward, observation, states, exact=True)
+
+
+def test_noise_free_recovery(columns, forward, retrieved):
+    truth = columns[2]
+    success = retrieved.codes == ResultCode.SUCCESS
+    error = np.asarray(forward.vector.aod_550(retrieved.inversion.x)) - truth
+    assert success.sum() >= 10
+    assert set(retrieved.codes[~success]) <= {ResultCode.NOT_OBSERVABLE}
+    np.testing.assert_allclose(error, 0, atol=CONVERGED)
+
+
+@pytest.fixture(scope="module")
+def solve(forward):
+    """`invert` of one pixel, compiled once."""
+    return jax.jit(partial(invert, forward))
+
+
+@pytest.mark.parametrize("index", [1, 6])
+def test_a_batch_is_its_pixels_one_by_one(columns, forward, retrieved, solve, index):
+    observation, states, truth = columns
+    start = forward.vector.x(1.2 * truth[index])
+    one = solve(pixel(observation, index), pixel(states, index), start)
+    assert one.converged
+    np.testing.assert_allclose(one.x, retrieved.inversion.x[index], atol=CONVERGED)
+    np.testing.assert_allclose(one.covariance, retrieved.inversion.covariance[index], rtol=1e-5)
+
+
+def test_posterior_covariance_is_that_of_the_jacobian(columns, forward, retrieved):
+    observation, states, truth = columns
+    jacobian = jax.jacfwd(forward)(forward.vector.x(truth[1]), pixel(states, 1))
+    whitened = np.asarray(jacobian) / observation.sigma[1][:, None]
+    expected = np.linalg.inv(whitened.T @ whitened)
+    np.testing.assert_allclose(retrieved.inversion.covariance[1], expected, rtol=1e-6)
+    np.testing.assert_allclose(retrieved.inversion.averaging_kernel[1], [[1]], rtol=1e-12)
+
+
+def test_a_pixel_that_is_not_finite_fails_alone(columns, forward, retrieved):
+    observation, states, _ = columns
+    pressure = states.atmosphere.pressure.copy()
+    pressure[2] = np.nan
+    broken = replace(states, atmosphere=replace(states.atmosphere, pressure=pressure))
+    values = observation.reflectance_factor.copy()
+    values[5] = np.nan
+    again = retrieve_pixels(forward, Observation(values, observation.sigma), broken, exact=True)
+    assert again.codes[2] == again.codes[5] == ResultCode.NONFINITE
+    others = np.delete(np.arange(len(values)), [2, 5])
+    np.testing.assert_array_equal(again.codes[others], retrieved.codes[others])
+    np.testing.assert_allclose(
+        again.inversion.x[others], retrieved.inversion.x[others], atol=CONVERGED
+    )
+
+
+def test_steps_can_run_out(columns, forward):
+    observation, states, _ = columns
+    few = retrieve_pixels(forward, observation, states, minimiser=Minimiser(max_steps=2))
+    assert set(few.codes[[1, 2]]) == {ResultCode.NOT_CONVERGED}
+    assert (few.inversion.num_steps <= 2).all()
+
+
+def test_a_prior_pulls_as_linear_theory_says(columns, forward, solve):
+    """x = x_a + A (x_true - x_a), for a prior so near that the forward model is linear."""
+    observation, states, truth = columns
+    x_true = np.asarray(forward.vector.x(truth[1]))
+    with_prior = Prior(jnp.asarray(x_true + 1e-4), jnp.array([[1e-4]]))
+    solution = solve(pixel(observation, 1), pixel(states, 1), jnp.asarray(x_true), with_prior)
+    kernel = np.asarray(solution.averaging_kernel)
+    assert 0.01 < kernel[0, 0] < 0.99
+    expected = with_prior.x_prior + kernel @ (x_true - with_prior.x_prior)
+    np.testing.assert_allclose(solution.x - x_true, expected - x_true, rtol=1e-3)
+    np.testing.assert_allclose(solution.prior_cost + solution.measurement_cost, solution.cost)
+    assert solution.prior_cost > 0
+
+
+def test_a_solution_can_be_mapped_over_starts(columns, forward):
+    observation, states, truth = columns
+    starts = forward.vector.x(jnp.array([0.1, 0.5, 1.5]))
+    solve = partial(invert, forward, pixel(observation, 1), pixel(states, 1))
+    solutions = jax.jit(jax.vmap(solve))(starts)
+    np.testing.assert_allclose(forward.vector.aod_550(solutions.x), truth[1], atol=CONVERGED)
+    assert len(BANDS) == observation.sigma.shape[1]

@@ -1,0 +1,82 @@
+"""Which minima are trusted."""
+
+import numpy as np
+import pytest
+
+from retrievals.diagnostics import probability_of_cost
+from retrievals.inverse import Inversion
+from retrievals.quality import EXACT_COST, aod_550_sigma, result_codes
+from retrievals.results import ResultCode, flag_attributes
+from retrievals.state_vector import StateVector
+
+VECTOR = StateVector()
+
+
+def inversion(aod_550=0.5, sigma=0.01, cost=0.0, converged=True):
+    """One pixel's inversion, as if it had been found."""
+    x = np.asarray(VECTOR.x(np.array([aod_550])))
+    variance = (sigma / np.asarray(VECTOR.aod_550_slope(x))) ** 2
+    return Inversion(
+        x=x,
+        covariance=variance[:, None, None],
+        averaging_kernel=np.ones((1, 1, 1)),
+        measurement_cost=np.array([cost]),
+        prior_cost=np.zeros(1),
+        num_steps=np.array([5]),
+        converged=np.array([converged]),
+    )
+
+
+def code(best, rival=None, exact=True, num_bands=3):
+    rival = best if rival is None else rival
+    return ResultCode(result_codes(VECTOR, best, rival, num_bands, exact=exact)[0])
+
+
+def test_the_error_of_optical_depth_is_propagated():
+    np.testing.assert_allclose(aod_550_sigma(VECTOR, inversion(sigma=0.03)), 0.03, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("best", "expected"),
+    [
+        (inversion(), ResultCode.SUCCESS),
+        (inversion(converged=False), ResultCode.NOT_CONVERGED),
+        (inversion(cost=np.nan), ResultCode.NONFINITE),
+        (inversion(cost=2 * EXACT_COST), ResultCode.POOR_FIT),
+        (inversion(aod_550=1.0, sigma=0.21), ResultCode.NOT_OBSERVABLE),
+        (inversion(aod_550=1.0, sigma=0.19), ResultCode.SUCCESS),
+        (inversion(sigma=np.nan), ResultCode.NOT_OBSERVABLE),
+    ],
+)
+def test_a_minimum_without_rival(best, expected):
+    assert code(best) == expected
+
+
+def test_noise_excuses_what_it_explains():
+    # chi-square with 2 degrees of freedom: exceeded by chance with probability exp(-cost / 2)
+    assert code(inversion(cost=13.0), exact=False) == ResultCode.SUCCESS
+    assert code(inversion(cost=14.0), exact=False) == ResultCode.POOR_FIT
+    np.testing.assert_allclose(probability_of_cost(np.array([5.0]), 2), np.exp(-2.5), rtol=1e-12)
+
+
+def test_a_rival_makes_a_minimum_ambiguous():
+    best = inversion(aod_550=0.5, cost=1.0)
+    assert code(best, inversion(aod_550=2.0, cost=4.0), exact=False) == ResultCode.AMBIGUOUS
+    assert code(best, inversion(aod_550=2.0, cost=6.0), exact=False) == ResultCode.SUCCESS
+    assert code(best, inversion(aod_550=0.505, cost=1.0), exact=False) == ResultCode.SUCCESS
+    unfinished = inversion(aod_550=2.0, cost=4.0, converged=False)
+    assert code(best, unfinished, exact=False) == ResultCode.SUCCESS
+    exact = inversion(aod_550=0.5)
+    assert code(exact, inversion(aod_550=0.6)) == ResultCode.AMBIGUOUS
+    assert code(exact, inversion(aod_550=0.6, cost=1e-5)) == ResultCode.SUCCESS
+
+
+def test_without_spare_measurements_only_an_exact_fit_will_do():
+    assert code(inversion(cost=1.0), exact=False, num_bands=1) == ResultCode.POOR_FIT
+    assert code(inversion(), exact=False, num_bands=1) == ResultCode.SUCCESS
+
+
+def test_every_code_has_a_message_and_a_flag():
+    assert all(code.message.endswith(".") for code in ResultCode)
+    attributes = flag_attributes()
+    assert len(attributes["flag_values"]) == len(attributes["flag_meanings"].split())

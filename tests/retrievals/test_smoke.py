@@ -1,0 +1,109 @@
+"""From a Dataset to a Dataset."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from abi_operator.files import InputError
+from abi_operator.nomenclature import QUALITY_FLAGS
+from retrievals import ResultCode, retrieve_smoke
+
+DARK, BRIGHT, CLOUDY = 0, 1, 2  # rows of a scene
+
+
+def shifted(ssa, shift):
+    """Single-scattering albedo with `shift` added to its logit."""
+    return 1 / (1 + (1 - ssa) / ssa * np.exp(-shift))
+
+
+RECOVERED = 1e-3
+"""The bar for noise-free recovery: error of optical depth on every pixel called a success."""
+
+
+def errors(simulated, retrieval):
+    error = np.abs(retrieval["aod_550"] - simulated["smoke_aod_550"])
+    return error.where(retrieval["result_code"] == ResultCode.SUCCESS)
+
+
+@pytest.fixture(scope="module")
+def retrieval(simulated):
+    return retrieve_smoke(simulated)
+
+
+def test_smoke_is_recovered_over_every_ground(simulated, retrieval):
+    assert retrieval["result_code"].dims == ("y", "x")
+    codes = retrieval["result_code"]
+    assert (codes[[DARK, BRIGHT]] == ResultCode.SUCCESS).all()
+    assert (codes[CLOUDY] == ResultCode.SUCCESS).sum() >= 2
+    assert errors(simulated, retrieval).max() < RECOVERED
+    assert (retrieval["cost"] < 1e-6).all() and (retrieval["num_steps"] > 0).all()
+    assert retrieval.attrs["num_streams"] == 4
+
+
+def test_single_scattering_albedo_is_recovered_with_it(make_result):
+    simulated = make_result(aod_550=(0.9, 2.0), ssa_shift=0.35)
+    truth = simulated["smoke_ssa"].copy()
+    known = simulated.assign(smoke_ssa=("band", shifted(truth.values, -0.35)))
+    retrieval = retrieve_smoke(known, retrieve_ssa=True)
+    success = retrieval["result_code"] == ResultCode.SUCCESS
+    assert success[DARK].all()
+    assert errors(simulated, retrieval).max() < RECOVERED
+    error = np.abs(retrieval["ssa"] - truth).where(success)
+    assert error.max() < RECOVERED and set(retrieval["ssa"].dims) == {"band", "y", "x"}
+    assert (retrieval["ssa_sigma"].where(success) > 0).sum() == 3 * success.sum()
+    unaware = retrieve_smoke(known)
+    assert (unaware["result_code"][DARK] == ResultCode.POOR_FIT).all()
+
+
+def test_times_and_refusals_keep_their_places(simulated):
+    times = np.array(["2007-10-23T18:00", "2007-10-23T19:00"], "datetime64[ns]")
+    broken = simulated.copy(deep=True)
+    broken["quality_flag"][0, 1] = QUALITY_FLAGS["night"]
+    broken["reflectance_factor"][0, 2, 2] = np.nan
+    both = xr.concat([simulated, broken], xr.DataArray(times, dims="time", name="time"))
+    for name in simulated.data_vars:
+        if "y" not in simulated[name].dims:
+            both[name] = simulated[name]
+    retrieval = retrieve_smoke(both)
+    assert retrieval["aod_550"].dims == ("time", "y", "x")
+    codes = retrieval["result_code"].values
+    assert codes[1, 0, 1] == ResultCode.UNUSABLE and codes[1, 2, 2] == ResultCode.INVALID_INPUT
+    assert np.isnan(retrieval["aod_550"].values[1, 0, 1])
+    assert retrieval["num_steps"].values[1, 0, 1] == 0
+    codes[1, 0, 1], codes[1, 2, 2] = codes[0, 0, 1], codes[0, 2, 2]
+    np.testing.assert_array_equal(codes[0], codes[1])
+    np.testing.assert_array_equal(retrieval["time"], times)
+    assert errors(both, retrieval).max() < RECOVERED
+
+
+def test_nothing_to_attempt_is_a_product_too(simulated):
+    clear = simulated.assign(smoke_brightness=xr.zeros_like(simulated["smoke_brightness"]))
+    retrieval = retrieve_smoke(clear)
+    assert (retrieval["result_code"] == ResultCode.NO_PLUME).all()
+
+
+def test_what_a_dataset_lacks_is_named(simulated):
+    with pytest.raises(InputError, match="no smoke_brightness; simulate a scene with a plume"):
+        retrieve_smoke(simulated.drop_vars("smoke_brightness"))
+    with pytest.raises(InputError, match="no band C06"):
+        retrieve_smoke(simulated, bands=("C01", "C06"))
+    with pytest.raises(InputError, match="2 unknowns need as many bands"):
+        retrieve_smoke(simulated, bands=("C01",), retrieve_ssa=True)
+
+
+@pytest.mark.slow
+def test_errors_under_noise_are_those_foretold(make_result, scale):
+    """Reduced chi-square and coverage over many draws; 600 pixels at full scale."""
+    num_columns = max(8, round(200 * scale))
+    simulated = make_result(aod_550=tuple(np.linspace(0.3, 2.0, num_columns)))
+    retrieval = retrieve_smoke(simulated, noise=True, seed=5)
+    success = (retrieval["result_code"] == ResultCode.SUCCESS).values
+    success[CLOUDY] = False  # where the forward model is far from linear within the noise
+    error = (retrieval["aod_550"] - simulated["smoke_aod_550"]).values[success]
+    ratio = error / retrieval["aod_550_sigma"].values[success]
+    num = success.sum()
+    assert num >= 0.9 * 2 * num_columns
+    reduced = retrieval["cost"].values[success].mean() / 2  # three bands, one unknown
+    assert abs(reduced - 1) < 4 / np.sqrt(num)  # 4 standard errors; variance 2 * 2 / 2^2 = 1
+    assert abs(np.mean(np.abs(ratio) < 1) - 0.683) < 4 * np.sqrt(0.683 * 0.317 / num)
+    assert abs(np.mean(ratio**2) - 1) < 4 * np.sqrt(2 / num)
