@@ -17,8 +17,9 @@ import jax
 import typer
 
 from .bands import BANDS, check_bands
+from .commands import one_sentence
 from .demo import write_demo
-from .files import InputError, output_folder
+from .files import output_folder
 from .scene import GOES_EAST
 from .simulation import Report, Request, Species, open_scene, simulate_scene
 
@@ -27,16 +28,6 @@ COMMANDS = "abi_operator.commands"
 
 # Albedo of the sea in the demonstration. [-]
 _DEMO_OCEAN_ALBEDO = 0.03
-
-
-@contextmanager
-def _one_sentence() -> Iterator[None]:
-    """Say what is wrong with an input in one sentence, and leave with exit code 2."""
-    try:
-        yield
-    except InputError as error:
-        typer.echo(f"abi-operator: {error}", err=True)
-        raise typer.Exit(2) from None
 
 
 @contextmanager
@@ -102,7 +93,7 @@ def simulate(
         broadband,
         num_streams,
     )
-    with _one_sentence(), _user_warnings():
+    with one_sentence(), _user_warnings():
         scene = open_scene(request)
         with output_folder(out) as folder:
             report = simulate_scene(scene, folder)
@@ -115,7 +106,7 @@ def demo(
     seed: Annotated[int, typer.Option(min=0, help="Another seed is another coast.")] = 0,
 ) -> None:
     """Make up a smoky Californian coast, simulate it, and do what other packages add."""
-    with _one_sentence(), _user_warnings():
+    with one_sentence(), _user_warnings():
         with output_folder(out) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
             request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume)
@@ -124,7 +115,7 @@ def demo(
     for entry in entry_points(group=COMMANDS, name="demo"):
         finish_demo = _load(entry)
         if finish_demo is not None:
-            with _one_sentence():
+            with one_sentence():
                 finish_demo(out)
 
 

@@ -1,7 +1,5 @@
 """Commands that `abi_operator`'s command line finds by their entry points."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +7,7 @@ import typer
 import xarray as xr
 
 from abi_operator.bands import check_bands
+from abi_operator.commands import one_sentence
 from abi_operator.files import InputError, output_folder, read_result
 
 from .scoring import format_report, score_retrieval
@@ -32,7 +31,7 @@ def retrieve(
         names = check_bands([name.strip() for name in bands.split(",")])
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    with _one_sentence(), read_result(result) as dataset:
+    with one_sentence(), read_result(result) as dataset:
         retrieval = retrieve_smoke(
             dataset, bands=names, retrieve_ssa=retrieve_ssa, noise=noise, seed=seed
         )
@@ -46,7 +45,7 @@ def score(
     csv: Annotated[Path | None, typer.Option(help="File for the scores, too.")] = None,
 ) -> None:
     """Score a retrieval against the truth that was specified."""
-    with _one_sentence(), read_result(result) as truth, _open_retrieval(retrieval) as retrieved:
+    with one_sentence(), read_result(result) as truth, _open_retrieval(retrieval) as retrieved:
         report = score_retrieval(truth, retrieved)
         if csv is not None:
             with output_folder(csv.absolute().parent) as folder:
@@ -101,13 +100,3 @@ def _open_retrieval(path: Path) -> xr.Dataset:
         dataset.close()
         raise InputError(f"{path} has no result_code; give a file that a retrieval wrote.")
     return dataset
-
-
-@contextmanager
-def _one_sentence() -> Iterator[None]:
-    """Say what is wrong with an input in one sentence, and leave with exit code 2."""
-    try:
-        yield
-    except InputError as error:
-        typer.echo(f"abi-operator: {error}", err=True)
-        raise typer.Exit(2) from None

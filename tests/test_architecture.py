@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = [
     {"cli"},
     {"simulation"},
-    {"demo", "scene"},
+    {"commands", "demo", "scene"},
     {"files", "pictures", "products"},
     {"reflectance"},
     {"optics", "solver"},
