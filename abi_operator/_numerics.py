@@ -49,8 +49,8 @@ def safe_sqrt(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1)), 0)
 
 
-def matmul(a: Float[Array, "row inner *batch"], b: Float[Array, "inner col *batch"]) -> Array:
-    """Matrix product, batch last.
+def matmul(a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"]) -> Array:
+    """Matrix product, batch last and broadcast.
 
     The sum over `inner` is written out: a chain of fused multiply-adds on whole batches, five to
     ten times faster than a batched ``dot`` on matrices of 2 to 8 rows.

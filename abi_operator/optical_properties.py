@@ -11,8 +11,6 @@ Extinction has a leading axis ``term``, over which radiances are summed with `we
 exponentials of a band's gas transmission. Grey matter has one term of weight 1.
 """
 
-from typing import Self
-
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -56,7 +54,7 @@ class OpticalProperties(eqx.Module):
     weight: Float[Array, " term"]
     scatterers: tuple[Scatterer, ...]
 
-    def __add__(self, other: Self) -> Self:
+    def __add__(self, other: "OpticalProperties") -> "OpticalProperties":
         """Mix two sets of optical properties.
 
         Raises
@@ -72,7 +70,7 @@ class OpticalProperties(eqx.Module):
             )
         weight = self.weight if self.weight.shape[0] > 1 else other.weight
         extinction = self.extinction + other.extinction
-        return type(self)(extinction, weight, self.scatterers + other.scatterers)
+        return OpticalProperties(extinction, weight, self.scatterers + other.scatterers)
 
     @property
     def tau(self) -> Float[Array, "term layer"]:

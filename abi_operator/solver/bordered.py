@@ -15,8 +15,6 @@ resonances, mu0 at an eigenvalue or equal to mu, do not exist.
 Nodes are scaled by sqrt(w mu) and the view's row by mu, which makes every core symmetric.
 """
 
-from typing import Self
-
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -46,31 +44,31 @@ class Bordered(eqx.Module):
     diagonal: Float[Array, "2 *batch"]
     corner: Float[Array, "*batch"]
 
-    def __add__(self, other: Self) -> Self:
-        return type(self)(
+    def __add__(self, other: "Bordered") -> "Bordered":
+        return Bordered(
             self.core + other.core,
             self.border + other.border,
             self.diagonal + other.diagonal,
             self.corner + other.corner,
         )
 
-    def __sub__(self, other: Self) -> Self:
+    def __sub__(self, other: "Bordered") -> "Bordered":
         return self + (-1.0) * other
 
-    def __rmul__(self, factor: float | Float[Array, "*batch"]) -> Self:
-        return type(self)(
+    def __rmul__(self, factor: float | Float[Array, "*batch"]) -> "Bordered":
+        return Bordered(
             factor * self.core,
             factor * self.border,
             factor * self.diagonal,
             factor * self.corner,
         )
 
-    def inverse(self) -> Self:
+    def inverse(self) -> "Bordered":
         """Inverse of a matrix with positive definite core and diagonal."""
         core = _inverse(self.core)
         solved = _matmul(core, self.border)
         between = jnp.sum(self.border[:, 1] * solved[:, 0], axis=0)
-        return type(self)(
+        return Bordered(
             core,
             -solved / self.diagonal,
             1 / self.diagonal,
