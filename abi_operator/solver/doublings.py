@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from .quadrature import double_gauss
+
 # Largest z = tau' / (2 mu_min) of a layer for which the start of `layer.half_layer`, doubled
 # 0, 1, 2, 3, 4 times, errs by 1e-12 or less; four times as much for each doubling after that.
 _REACH = (0.317, 0.648, 1.40, 65.8, 269.0)
@@ -25,8 +27,7 @@ def sufficient_doublings(max_tau: float, min_mu: float, num_streams: int) -> int
     num_streams
         Number of streams; their smallest cosine counts as well.
     """
-    nodes = np.polynomial.legendre.leggauss(num_streams // 2)[0]
-    z = max_tau / (2 * min(min_mu, (nodes[0] + 1) / 2))
+    z = max_tau / (2 * min(min_mu, double_gauss(num_streams)[0][0]))
     for doublings in _BUCKETS:
         reach = _REACH[doublings] if doublings < 5 else _REACH[4] * 4.0 ** (doublings - 4)
         if z <= reach:

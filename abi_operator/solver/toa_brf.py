@@ -99,11 +99,17 @@ def toa_brf(
     )
 
 
-def _promoted(arrays: list) -> list[Array | np.ndarray]:
-    """Give all arguments their common floating type, before any JAX operation."""
-    arrays = [x if isinstance(x, jax.Array) else np.asarray(x) for x in arrays]
-    dtype = np.result_type(*(x.dtype for x in arrays), np.float16)
-    dtype = jax.dtypes.canonicalize_dtype(dtype)
+def _promoted(arguments: list) -> list[Array | np.ndarray]:
+    """Give all arguments their common floating type, before any JAX operation.
+
+    Python numbers have no type of their own and follow the arrays; integers become floating.
+    """
+    arrays = [x if isinstance(x, jax.Array) else np.asarray(x) for x in arguments]
+    types = [
+        argument if isinstance(argument, int | float) else array.dtype
+        for argument, array in zip(arguments, arrays, strict=True)
+    ]
+    dtype = jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
     return [x.astype(dtype) for x in arrays]
 
 
@@ -185,6 +191,7 @@ def _solve(
     albedo, mu0, mu, relative_azimuth = (inward(x) for x in columns)
     tau, ssa = inward(tau, num_layers), inward(ssa, num_layers)
     moments = inward(moments, num_layers, moments.shape[-1])
+    moments = jnp.concatenate([jnp.ones_like(moments[:, :1]), moments[:, 1:]], axis=1)
 
     arrays = (tau, ssa, moments, albedo, mu0, mu, relative_azimuth)
     if tms and phase_function is not None:

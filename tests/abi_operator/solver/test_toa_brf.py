@@ -125,6 +125,23 @@ def test_exact_phase_function_equals_a_long_enough_series():
     np.testing.assert_allclose(summed, given, rtol=1e-11)
 
 
+def test_few_modes_leave_the_exact_single_scattering_alone():
+    """A thin layer scatters once, so that one mode is as good as all; a thick one needs more."""
+    tau, *rest = simple_columns()
+    thin, thick = (1e-9 * tau, *rest), (tau, *rest)
+    rest[2][:] = 0  # black ground
+    np.testing.assert_allclose(brf(thin, num_modes=1), brf(thin), rtol=1e-6)
+    errors = [np.abs(brf(thick, num_modes=m) / brf(thick) - 1).max() for m in (1, 3, 6)]
+    assert errors[0] > 10 * errors[1] > 100 * errors[2]
+
+
+def test_moment_zero_is_one_whatever_is_given():
+    tau, ssa, moments, *rest = simple_columns()
+    other = moments.copy()
+    other[..., 0] = 7
+    np.testing.assert_array_equal(brf((tau, ssa, other, *rest)), brf((tau, ssa, moments, *rest)))
+
+
 @pytest.mark.float32
 def test_float32_in_float32_out_and_near_float64():
     columns = [np.asarray(x, np.float32) for x in simple_columns(count=50)]
@@ -146,6 +163,9 @@ def test_other_float_types_are_promoted_together():
     columns = simple_columns()
     mixed = [np.asarray(columns[0], np.float32), *columns[1:]]
     assert toa_brf(*mixed, num_streams=8, num_doublings=5).dtype == jnp.result_type(float)
+    single = [np.asarray(x, np.float32) for x in columns]
+    single[3] = 0.1  # a Python number follows the arrays
+    assert toa_brf(*single, num_streams=8, num_doublings=5).dtype == jnp.float32
 
 
 @pytest.mark.parametrize(
