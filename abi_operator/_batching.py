@@ -2,9 +2,15 @@
 
 Kernels have their batch last and work on one tile of columns at a time, small enough that the
 matrices of a layer stay in the cache and large enough to fill the vector units. Microseconds per
-layer and azimuth mode, value, float64, one core (3 doublings, 24 layers), at 32, 64 and 128
-columns a tile: 8 streams 0.8, 0.7, 0.6; 16 streams 2.9, 2.8, 2.8. Without tiles, at 512 columns
-and more, the intermediate matrices leave the cache and the same work takes 2 to 4 times as long.
+layer and azimuth mode of the value, float64, one core (`benchmarks/layout.py`):
+
+======= ==== ==== ==== ==== ==== ========
+streams   16   32   64  128  256 no tiles
+======= ==== ==== ==== ==== ==== ========
+4       0.81 0.44 0.29 0.22 0.19     0.19
+8       1.64 0.79 0.63 0.53 0.63     0.89
+16      3.58 3.11 2.80 2.78 4.33     5.79
+======= ==== ==== ==== ==== ==== ========
 """
 
 from collections.abc import Callable
@@ -16,7 +22,7 @@ from jaxtyping import Array
 
 def tile_size(num_streams: int) -> int:
     """Columns that are solved together."""
-    return 128 if num_streams <= 8 else 64 if num_streams <= 16 else 16
+    return 256 if num_streams <= 4 else 128 if num_streams <= 8 else 64 if num_streams <= 16 else 16
 
 
 def map_tiles(function: Callable[..., Array], arrays: tuple[Array, ...], tile: int) -> Array:

@@ -12,10 +12,10 @@ from jaxtyping import PyTree
 
 T = TypeVar("T")
 
-CHUNK = 32
+CHUNK = 16
 """Pixels that are solved together. A minimisation lasts until the slowest of them is done, and the
-matrices of many columns leave the cache: 192 pixels of three bands took 2.7, 1.7, 3.2 and 4.2 s on
-two cores in chunks of 16, 32, 48 and 96."""
+matrices of many columns leave the cache: 196 pixels of three bands took 3.1, 3.5, 3.8 and 4.8 s on
+two cores in chunks of 16, 32, 48 and 96 (`benchmarks/layout.py`)."""
 
 
 def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUNK) -> T:

@@ -14,6 +14,7 @@ from .scoring import format_report, score_retrieval
 from .smoke import BANDS, retrieve_smoke
 
 RETRIEVAL = "retrieval.nc"
+SCORES = "scores.csv"
 
 
 def retrieve(
@@ -65,8 +66,9 @@ def finish_demo(folder: Path) -> None:
         report = score_retrieval(result, retrieval)
     with output_folder(folder) as files:
         _to_netcdf(retrieval, files / RETRIEVAL)
-        _write_csv(report, files / "scores.csv")
-    typer.echo(f"wrote {folder / RETRIEVAL}")
+        _write_csv(report, files / SCORES)
+    for name in (RETRIEVAL, SCORES):
+        typer.echo(f"wrote {folder / name}")
     typer.echo(format_report(report))
 
 

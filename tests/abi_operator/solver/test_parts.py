@@ -9,8 +9,11 @@ from abi_operator._batching import map_tiles
 from abi_operator._numerics import inverse, matmul, safe_divide, safe_sqrt
 from abi_operator.solver import double_gauss, sufficient_doublings
 from abi_operator.solver.bordered import Bordered, between
+from abi_operator.solver.doublings import _REACH
 from abi_operator.solver.layer import half_layer
 from abi_operator.solver.legendre import associated_legendre, legendre_series
+
+REACH_ERROR = 2e-12  # what `doublings` promises, and rounding
 
 
 @pytest.mark.parametrize("num_streams", [2, 8, 32])
@@ -122,3 +125,17 @@ def test_more_doublings_for_thicker_layers_and_lower_sun():
     assert sufficient_doublings(1e5, 1e-3, 8) <= 13
     steps = [sufficient_doublings(t, 0.3, 8) for t in (0.01, 1, 30, 1e3, 1e6)]
     assert steps == sorted(steps)
+
+
+@pytest.mark.parametrize("doublings", range(7))
+def test_half_layer_is_tanh_up_to_the_reach_of_its_doublings(doublings):
+    """One node with a = b = 1: admittance tanh(h), impedance h coth(h), h = tau / 2."""
+    reach = _REACH[doublings] if doublings < 5 else _REACH[4] * 4 ** (doublings - 4)
+    tau = jnp.asarray(2 * reach * np.linspace(1e-3, 1, 50))
+    ones = jnp.ones((1, 1, 50))
+    unit = Bordered(ones, 0 * jnp.ones((1, 2, 50)), jnp.ones((2, 50)), jnp.zeros(50))
+    admittance, impedance = half_layer(unit, unit, tau, doublings)
+    h = np.asarray(tau) / 2
+    for found, exact in ((admittance, np.tanh(h)), (impedance, h / np.tanh(h))):
+        np.testing.assert_allclose(found.core[0, 0], exact, rtol=REACH_ERROR)
+        np.testing.assert_allclose(found.diagonal[0], exact, rtol=REACH_ERROR)
