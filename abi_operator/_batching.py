@@ -14,6 +14,7 @@ streams   16   32   64  128  256 no tiles
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -25,22 +26,22 @@ def tile_size(num_streams: int) -> int:
     return 256 if num_streams <= 4 else 128 if num_streams <= 8 else 64 if num_streams <= 16 else 16
 
 
-def map_tiles(function: Callable[..., Array], arrays: tuple[Array, ...], tile: int) -> Array:
-    """Apply a batch-last `function` to its arrays tile by tile.
+def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
+    """Apply a batch-last `function` to a pytree of arrays tile by tile.
 
     Parameters
     ----------
     function
-        Maps arrays whose last axis is the batch to one array, batch last.
-    arrays
-        Its arguments, all with the same last axis. A last, partial tile is filled up with copies
-        of the last column, whose results are dropped.
+        Maps a pytree of arrays whose last axis is the batch to another such.
+    columns
+        Its argument; all leaves have the same last axis. A last, partial tile is filled up with
+        copies of the last column, whose results are dropped.
     tile
         Columns a tile.
     """
-    size = arrays[0].shape[-1]
+    size = jax.tree.leaves(columns)[0].shape[-1]
     if size <= tile:
-        return function(*arrays)
+        return function(columns)
     count = -(-size // tile)
 
     def tiled(x: Array) -> Array:
@@ -49,5 +50,7 @@ def map_tiles(function: Callable[..., Array], arrays: tuple[Array, ...], tile: i
             jnp.pad(x, padding, mode="edge").reshape(*x.shape[:-1], count, tile), -2, 0
         )
 
-    result = jax.lax.map(lambda xs: function(*xs), tuple(tiled(x) for x in arrays))
-    return jnp.moveaxis(result, 0, -2).reshape(*result.shape[1:-1], count * tile)[..., :size]
+    def joined(x: Array) -> Array:
+        return jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], count * tile)[..., :size]
+
+    return jax.tree.map(joined, jax.lax.map(function, jax.tree.map(tiled, columns)))

@@ -1,117 +1,269 @@
 """The discrete-ordinate problem of one column, evaluated with 40 digits.
 
-It shares no code with the solver. Matrices are dense over (nodes, sun, view), unscaled and not
-symmetric; layers start so thin that the rational tanh is exact to 40 digits. It decides which of
-two solvers is right where they differ.
+It shares no code with the solver, and no algorithm: a layer's reflection and transmission come
+from the Taylor series of its matrix exponential and from doubling, layers are joined by adding,
+thermal emission enters the exponential as one more component. Matrices are dense over (nodes, sun,
+views), unscaled and not symmetric. Numbers are balls (`flint.arb`) that contain what rounding has
+done to them; a result whose ball is wider than 1e-40 of it is refused. So this decides which of two
+solvers is right where they differ.
 """
 
-import mpmath
+from collections.abc import Callable
+from math import ceil
+from typing import NamedTuple
+
 import numpy as np
-from mpmath import mp, mpf
+from flint import arb, arb_mat, ctx
+from forty_digit_layers import EXPONENT, identity, layer_emission, scattering
+
+# 77 digits, of which exponentials, recursions and the pessimism of balls take 10 to 25.
+BITS = 256
+RADIUS = 1e-40
 
 
-def _gauss(count):
-    """Gauss-Legendre nodes and weights on (0, 1), by Newton's method from float64."""
-    nodes, weights = [], []
-    for guess in np.polynomial.legendre.leggauss(count)[0]:
-        x = mpmath.findroot(lambda t: mpmath.legendre(count, t), mpf(float(guess)))
-        slope = count * (x * mpmath.legendre(count, x) - mpmath.legendre(count - 1, x))
-        slope /= x * x - 1
-        nodes.append((x + 1) / 2)
-        weights.append(1 / ((1 - x * x) * slope * slope))
-    return nodes, weights
+class Ground(NamedTuple):
+    """A ground that is not Lambertian, in float64.
+
+    `brdf(mu_out, mu_in, relative_azimuth)` is pi times the bidirectional reflectance distribution
+    function, and `mode(m, mu_out, mu_in)` the rho_m of sum (2 - delta_m0) rho_m cos(m azimuth).
+    """
+
+    brdf: Callable[[float, float, float], float]
+    mode: Callable[[int, float, float], float]
 
 
-def _legendre(m, degrees, mu):
+class _Layer(NamedTuple):
+    """A scaled layer; `secant` attenuates the sun, `planck` is at its top and bottom."""
+
+    tau: arb
+    ssa: arb
+    moments: list[arb]
+    secant: arb
+    planck: tuple[arb, arb]
+
+
+class _Directions(NamedTuple):
+    """Nodes, then the sun, then the views, with their quadrature weights."""
+
+    cosines: list[arb]
+    weights: list[arb]
+    sun: int
+
+
+def _legendre(m: int, degrees: int, mu: arb) -> list[arb]:
     """sqrt((l - m)! / (l + m)!) P_l^m(mu) for l below `degrees`, zero for l < m."""
-    value = mpf(1)
+    value = arb(1)
     for i in range(1, m + 1):
-        value *= mp.sqrt(1 - mu * mu) * mp.sqrt(mpf(2 * i - 1) / (2 * i))
-    out, before = [mpf(0)] * m, mpf(0)
+        value *= (1 - mu * mu).sqrt() * (arb(2 * i - 1) / (2 * i)).sqrt()
+    out, before = [arb(0)] * m, arb(0)
     for degree in range(m, degrees):
         out.append(value)
-        up, down = mp.sqrt(mpf((degree + 1) ** 2 - m * m)), mp.sqrt(mpf(degree**2 - m * m))
+        up, down = arb((degree + 1) ** 2 - m * m).sqrt(), arb(degree**2 - m * m).sqrt()
         before, value = value, ((2 * degree + 1) * mu * value - down * before) / up
     return out
 
 
-def _layer(a, b, tau):
-    """Half-layer admittance and impedance, doubled from a layer of tau / 2^k."""
-    size = a.rows
-    one = mp.eye(size)
-    thick = tau * max(abs(a[i, i]) for i in range(size))
-    doublings = max(0, int(mp.ceil(mp.log(max(thick, mpf(1)) * 4000, 2))))
-    h = tau / 2 ** (doublings + 1)
-    x = h * h * b * a
-    phi = (945 * one + 105 * x + x * x) * ((945 * one + 420 * x + 15 * x * x) ** -1)
-    admittance, impedance = h * a * phi, phi * h * b
-    for _ in range(doublings):
-        k = (one + impedance * admittance) ** -1
-        admittance, impedance = 2 * admittance * k, 2 * k * impedance
-    return admittance, impedance
+def _matrices(
+    layer: _Layer, functions: list, m: int, directions: _Directions, corrected: bool
+) -> tuple[arb_mat, arb_mat]:
+    """A and B of one mode: dt/dtau = A s, ds/dtau = B t with s = up + down, t = up - down."""
+    cosines, weights, sun = directions
+    size, out = len(cosines), []
+    for parity in (0, 1):
+        degrees = range(m + parity, len(layer.moments), 2)
+        left = arb_mat([[f[degree] for degree in degrees] for f in functions])
+        strength = [layer.ssa * (2 * degree + 1) * layer.moments[degree] for degree in degrees]
+        right = [
+            [w * f[degree] * s for w, f in zip(weights, functions, strict=True)]
+            for degree, s in zip(degrees, strength, strict=True)
+        ]
+        kernel = (left * arb_mat(right)).tolist() if strength else [[arb(0)] * size] * size
+        rows = []
+        for i in range(size):
+            # Nothing feeds the sun; the light it sends to a view at once may be added elsewhere.
+            row = [int(i == j) - (arb(0) if i == sun else kernel[i][j]) for j in range(size)]
+            if corrected and i > sun:
+                row[sun] = arb(0)
+            rows.append([x / cosines[i] for x in row])
+        rows[sun][sun] = layer.secant
+        out.append(arb_mat(rows))
+    return out[0], out[1]
+
+
+def _reflection(ground: float | Ground, m: int, directions: _Directions) -> arb_mat:
+    """Reflection of the ground in one mode; a `Ground` sends nothing from the sun to the views."""
+    cosines, weights, sun = directions
+    size = len(cosines)
+    rows = [[arb(0)] * size for _ in range(size)]
+    for i in range(size):
+        for j in range(sun + 1):
+            if i == sun or (isinstance(ground, Ground) and i > sun and j == sun):
+                continue
+            if isinstance(ground, Ground):
+                rho = (-1) ** m * arb(ground.mode(m, float(cosines[i]), float(cosines[j])))
+            else:
+                rho = arb(float(ground)) if m == 0 else arb(0)
+            rows[i][j] = 2 * rho * cosines[j] * weights[j]
+    return arb_mat(rows)
+
+
+def _mode(
+    layers: list[_Layer],
+    ground: float | Ground,
+    emission: arb | None,
+    m: int,
+    directions: _Directions,
+    corrected: bool,
+) -> tuple[arb_mat, arb_mat]:
+    """Reflection of layers and ground in one mode, and what leaves their top by emission."""
+    cosines, _, sun = directions
+    size = len(cosines)
+    one = identity(size)
+    functions = [_legendre(m, len(layers[0].moments), c) for c in cosines]
+    below = _reflection(ground, m, directions)
+    glow = arb_mat([[arb(0) if i == sun or emission is None else emission] for i in range(size)])
+    for layer in reversed(layers):
+        if layer.tau == 0:
+            continue
+        a, b = _matrices(layer, functions, m, directions, corrected)
+        steepest = max(float(1 / min(cosines)), float(layer.secant))
+        # Exponentials across thin parts only, where light is emitted.
+        parts = 1 if emission is None else ceil(float(layer.tau) * steepest / EXPONENT)
+        tau = layer.tau / parts
+        reflection, transmission = scattering(a, b, tau / 2, steepest)
+        if emission is not None:
+            source = [-2 * (1 - layer.ssa) / c for c in cosines]
+            source[sun] = arb(0)
+            ups, downs = layer_emission(a, b, tau, source)
+        for part in reversed(range(parts)):
+            between = (one - below * reflection).inv()
+            if emission is not None:
+                top, bottom = layer.planck
+                slope = (bottom - top) / layer.tau
+                planck = arb_mat([[top + part * tau * slope], [slope]])
+                glow = ups * planck + transmission * (between * (glow + below * (downs * planck)))
+            below = reflection + transmission * (between * (below * transmission))
+    return below, glow
+
+
+def _scaled(column: tuple, secant, planck_levels, num_streams: int, delta_m: bool) -> list[tuple]:
+    """delta-M scaled layers, each with omega / (1 - omega f) and all its moments."""
+    out = []
+    for i, (t, w, chi) in enumerate(zip(*column, strict=True)):
+        t, w, chi = arb(float(t)), arb(float(w)), [arb(float(c)) for c in chi]
+        f = chi[num_streams] if delta_m else arb(0)
+        kept = [(c - f) / (1 - f) for c in chi[:num_streams]]
+        planck = (arb(float(planck_levels[i])), arb(float(planck_levels[i + 1])))
+        ratio = w / (1 - w * f)
+        scaled = _Layer((1 - w * f) * t, (1 - f) * ratio, kept, arb(secant[i]), planck)
+        out.append((scaled, ratio, chi))
+    return out
+
+
+def _direct(scaled: list[tuple], ground, corrected: bool, sun: arb, view: arb, azimuth: arb) -> arb:
+    """Light scattered once or reflected once, exactly, for an irradiance of pi."""
+    angle = -view * sun
+    angle -= (1 - view * view).sqrt() * (1 - sun * sun).sqrt() * azimuth.cos()
+    degrees = range(len(scaled[0][2]) if corrected else 0)
+    # Not by recursion, in which balls grow by a digit in three degrees.
+    polynomials = [(2 * degree + 1) * angle.legendre_p(degree) for degree in degrees]
+    total, passed = arb(0), arb(0)
+    for layer, ratio, chi in scaled:
+        both = 1 / view + layer.secant
+        if corrected:
+            phase = sum((p * c for p, c in zip(polynomials, chi, strict=True)), arb(0))
+            part = (-passed).exp() * -(-both * layer.tau).expm1() / both
+            total += ratio * phase * part / (4 * view)
+        passed += both * layer.tau
+    if isinstance(ground, Ground):
+        brdf = ground.brdf(float(view), float(sun), float(azimuth))
+        total += sun * arb(brdf) * (-passed).exp()
+    return total
+
+
+def forty_digit_radiance(
+    tau,
+    ssa,
+    moments,
+    albedo,
+    mu0,
+    mu,
+    relative_azimuth,
+    num_streams,
+    corrected,
+    *,
+    solar_irradiance=0.0,
+    planck_levels=None,
+    surface_emission=0.0,
+    isotropic_top=0.0,
+    secant=None,
+    delta_m=True,
+):
+    """Radiance at the top of one column in the units of its sources.
+
+    `moments` has axes ``layer moment``; `mu` and `relative_azimuth` are numbers or lists of views.
+    `albedo` is a number or a `Ground`, `secant` replaces 1/mu0 in each layer's attenuation of the
+    sun, and `corrected` adds the exact single scattering. Numbers enter as float64, exactly.
+    """
+    before, ctx.prec = ctx.prec, BITS
+    try:
+        count = num_streams // 2
+        pairs = [arb.legendre_p_root(count, k, weight=True) for k in range(count)]
+        sun = arb(float(mu0))
+        views = [arb(float(x)) for x in np.atleast_1d(mu)]
+        azimuths = [arb(float(x)) for x in np.atleast_1d(relative_azimuth)]
+        directions = _Directions(
+            [*((x + 1) / 2 for x, _ in pairs), sun, *views],
+            [*(w / 2 for _, w in pairs), arb(1), *[arb(0)] * len(views)],
+            count,
+        )
+        shines = planck_levels is not None or surface_emission != 0
+        planck_levels = np.zeros(len(tau) + 1) if planck_levels is None else planck_levels
+        secant = [1 / sun] * len(tau) if secant is None else [float(x) for x in secant]
+        scaled = _scaled((tau, ssa, moments), secant, planck_levels, num_streams, delta_m)
+        layers = [layer for layer, *_ in scaled]
+        # Sunlight so far for an irradiance of pi.
+        solar = [
+            _direct(scaled, albedo, corrected, sun, view, azimuth)
+            for view, azimuth in zip(views, azimuths, strict=True)
+        ]
+        thermal = [arb(0)] * len(views)
+        for m in range(num_streams if solar_irradiance else 1):
+            unscattered = all(c == 0 for layer in layers for c in layer.moments[m:])
+            if m and unscattered and not isinstance(albedo, Ground):
+                break
+            emission = arb(float(surface_emission)) if shines and m == 0 else None
+            reflection, glow = _mode(layers, albedo, emission, m, directions, corrected)
+            for v, azimuth in enumerate(azimuths):
+                row = count + 1 + v
+                factor = (1 if m == 0 else 2) * (-1) ** m * (m * azimuth).cos()
+                solar[v] += factor * reflection[row, count] / 2
+                if m == 0:
+                    fallen = sum((reflection[row, j] for j in range(count)), arb(0))
+                    thermal[v] = glow[row, 0] + arb(float(isotropic_top)) * fallen
+        flux = arb(float(solar_irradiance)) / arb.pi()
+        radiances = [flux * s + t for s, t in zip(solar, thermal, strict=True)]
+        for x in radiances:
+            if not float(x.rad()) <= RADIUS * abs(float(x)):
+                raise ArithmeticError(f"the result is only known as {x}.")
+        values = [float(x) for x in radiances]
+        return np.array(values) if np.ndim(mu) else values[0]
+    finally:
+        ctx.prec = before
 
 
 def forty_digit_brf(tau, ssa, moments, albedo, mu0, mu, relative_azimuth, num_streams, corrected):
     """Bidirectional reflectance factor; arguments as `cdisort.cdisort_brf`."""
-    with mp.workdps(45):
-        count = num_streams // 2
-        nodes, weights = _gauss(count)
-        sun, view, size = count, count + 1, count + 2
-        mu0, mu, albedo = mpf(float(mu0)), mpf(float(mu)), mpf(float(albedo))
-        cosines, quadrature = [*nodes, mu0, mu], [*weights, mpf(1), mpf(0)]
-        layers, single, above = [], mpf(0), mpf(0)
-        secant = 1 / mu + 1 / mu0
-        angle = -mu * mu0 - mp.sqrt(1 - mu * mu) * mp.sqrt(1 - mu0 * mu0) * mp.cos(
-            mpf(float(relative_azimuth))
-        )
-        for t, w, chi in zip(tau, ssa, moments, strict=True):
-            t, w, chi = mpf(float(t)), mpf(float(w)), [mpf(float(c)) for c in chi]
-            f = chi[num_streams]
-            scaled = (1 - w * f) * t
-            chi_scaled = [(c - f) / (1 - f) for c in chi[:num_streams]]
-            layers.append((scaled, w * (1 - f) / (1 - w * f), chi_scaled))
-            if corrected:
-                before, here, phase = mpf(1), angle, mpf(1)
-                for degree in range(1, len(chi)):
-                    phase += (2 * degree + 1) * chi[degree] * here
-                    before, here = (
-                        here,
-                        ((2 * degree + 1) * angle * here - degree * before) / (degree + 1),
-                    )
-                part = mp.exp(-secant * above) * -mp.expm1(-secant * scaled)
-                single += w * phase / (1 - w * f) * part / (4 * mu * mu0 * secant)
-            above += scaled
-        total = single
-        for m in range(num_streams):
-            functions = [_legendre(m, num_streams, c) for c in cosines]
-            reflection = mp.zeros(size)
-            if m == 0:
-                for i in range(size):
-                    for j in range(size):
-                        right = mu0 if j == sun else cosines[j] * quadrature[j]
-                        reflection[i, j] = 0 if i == sun or j == view else 2 * albedo * right
-            stack = mp.eye(size) - 2 * reflection / (1 + albedo) if m == 0 else mp.eye(size)
-            for scaled, w, chi in reversed(layers):
-                a, b = mp.zeros(size), mp.zeros(size)
-                for i in range(size):
-                    for j in range(size):
-                        even = odd = mpf(0)
-                        blocked = i == sun or j == view or (corrected and (i, j) == (view, sun))
-                        for degree in range(m, num_streams):
-                            if blocked:
-                                break
-                            term = w * (2 * degree + 1) * chi[degree]
-                            term *= functions[i][degree] * functions[j][degree] * quadrature[j]
-                            even += term if (degree + m) % 2 == 0 else 0
-                            odd += term if (degree + m) % 2 else 0
-                        own = mpf(1 if i == j else 0)
-                        a[i, j] = (own - even) / cosines[i]
-                        b[i, j] = (own - odd) / cosines[i]
-                admittance, impedance = _layer(a, b, scaled)
-                one = mp.eye(size)
-                middle = ((one + stack * impedance) ** -1) * (stack + admittance)
-                stack = (admittance + middle) * ((one + impedance * middle) ** -1)
-            corner = 2 * ((mp.eye(size) + stack) ** -1)[view, sun]
-            factor = (1 if m == 0 else 2) * (-1) ** m * mp.cos(m * mpf(float(relative_azimuth)))
-            total += factor * corner / (2 * mu0)
-        return float(total)
+    radiance = forty_digit_radiance(
+        tau,
+        ssa,
+        moments,
+        albedo,
+        mu0,
+        mu,
+        relative_azimuth,
+        num_streams,
+        corrected,
+        solar_irradiance=1.0,
+    )
+    return np.pi * radiance / mu0

@@ -1,11 +1,27 @@
-"""Radiative transfer of one column: layers, ground and directions in, reflectance out.
+"""Radiative transfer of one column: layers, ground and directions in, light at the top out.
 
-`toa_brf` is a discrete-ordinate solver in JAX for plane-parallel layers over a Lambertian ground,
-with delta-M and exact single scattering, batched and differentiable in every input. It knows
-nothing of aerosols, instruments or files.
+A discrete-ordinate solver in JAX for plane-parallel layers, batched and differentiable in every
+input. `toa_brf` gives reflectances, `toa_radiance` radiances with thermal emission beside the sun,
+`toa_albedo` the share of sunlight sent back, and `surface_coupling` the reflectance as a closed
+form in the ground's albedo. The ground is an albedo or a `Surface` of your own. Callers whose phase
+functions are sharp pass them at the scattering angle (`cos_scattering_angle`), from closed forms or
+from tables (`interpolate_phase_function`, `mix_phase_functions`). It knows nothing of aerosols,
+instruments or files.
 """
 
+from .albedo import SurfaceCoupling as SurfaceCoupling
+from .albedo import surface_coupling as surface_coupling
+from .albedo import toa_albedo as toa_albedo
 from .doublings import sufficient_doublings as sufficient_doublings
+from .phase_table import interpolate_phase_function as interpolate_phase_function
+from .phase_table import mix_moments as mix_moments
+from .phase_table import mix_phase_functions as mix_phase_functions
+from .phase_table import moments_of_table as moments_of_table
+from .phase_table import normalise_table as normalise_table
 from .quadrature import double_gauss as double_gauss
 from .single_scatter import cos_scattering_angle as cos_scattering_angle
+from .slant_path import slant_path_secant as slant_path_secant
+from .surface import Lambertian as Lambertian
+from .surface import Surface as Surface
 from .toa_brf import toa_brf as toa_brf
+from .toa_radiance import toa_radiance as toa_radiance

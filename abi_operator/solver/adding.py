@@ -3,6 +3,12 @@ r"""The stack of layers, from the ground up.
 A stack is summarised by its admittance Y = (1 - R)(1 + R)^{-1}, R its reflection, at its upper
 face: t = -Y s. Adding a layer is the addition theorem of tanh; no reflection or transmission of a
 layer is ever formed. The answer of a mode is the sun -> view entry of the final R.
+
+Light that layers and ground emit adds a column e, :math:`t = -Y(s - 2B) + e`, with B the Planck
+function at the upper face. Inside a layer whose B is linear in tau, s = 2B, t = dB/dtau 2 B^{-1} 1
+solves the equations with their thermal source exactly, whatever scatters, so that only the jump of
+t at the faces is left to carry: an isothermal column over an equally warm ground has e = 0 to the
+last digit, and the source costs one vector a layer.
 """
 
 import equinox as eqx
@@ -10,7 +16,39 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._numerics import inverse, matmul
-from .bordered import Bordered, between
+from .bordered import Bordered, Quotient, Vector, between_and_quotient
+
+
+class Emission(eqx.Module):
+    """Light from within a stack at its upper face.
+
+    Parameters
+    ----------
+    column
+        The vector e of ``t = -Y (s - 2 B) + e``.
+    returned
+        What a black ground that emits radiance 1 under cold air gets back with s = 0 at the upper
+        face: the downward irradiance over pi. Without meaning for other grounds.
+    """
+
+    column: Vector
+    returned: Float[Array, "*batch"]
+
+
+def emitting_ground(
+    ground: Bordered,
+    one: Vector,
+    radiance: Float[Array, "*batch"],
+    planck: Float[Array, "*batch"],
+) -> Emission:
+    r"""Ground that emits `radiance` isotropically under air of Planck function `planck`.
+
+    :math:`e = E(1+Y)1 - 2BY1`; 0 for :math:`E = (1-a)B` over Lambertian ground. `returned` starts
+    as -1, the irradiance that keeps s = 0 over a black ground of radiance 1.
+    """
+    reflected = ground @ one
+    column = radiance * one + (radiance - 2 * planck) * reflected
+    return Emission(column, -jnp.ones_like(radiance))
 
 
 def add_layer(
@@ -18,20 +56,88 @@ def add_layer(
 ) -> Bordered:
     r"""Put a layer on a stack.
 
-    With the layer's half-layer admittance Y_e, impedance Z (times h) and h = tau / 2,
-    :math:`Y \leftarrow Y + 2Y_e - h(Y + Y_e)[hY + (Z + hY_e)/2]^{-1}(Y + Y_e)`.
+    With the layer's half-layer admittance Y_e, impedance Z (times h), h = tau / 2 and
+    :math:`S = hY + (Z + hY_e)/2`,
+    :math:`Y \leftarrow Y + 2Y_e - h(Y + Y_e)S^{-1}(Y + Y_e)`.
     The beams' own entries of Y are 1 whatever lies below, and are set so.
     """
+    return _add(stack, admittance, impedance, tau)[0]
+
+
+def add_emitting_layer(
+    stack: Bordered,
+    emission: Emission,
+    admittance: Bordered,
+    impedance: Bordered,
+    tau: Float[Array, "*batch"],
+    jump: Vector | None,
+) -> tuple[Bordered, Emission]:
+    r"""Put a layer on a stack that emits.
+
+    As `add_layer`, and :math:`e \leftarrow e - (Y + Y_e)S^{-1}(he - j)` with the layer's own
+    :math:`j = (B_{bottom} - B_{top}) B^{-1} 1`, None for air that does not emit.
+    """
+    h = 0.5 * tau
+    added, quotient = _add(stack, admittance, impedance, tau)
+    driving = h * emission.column
+    if jump is not None:
+        driving = driving - jump
+    column = emission.column - quotient.transposed_action(driving)
+    solved = matmul(quotient.inverse, emission.column.nodes[:, None])[:, 0]
+    returned = emission.returned + h * jnp.sum(emission.column.nodes * solved, axis=0)
+    return added, Emission(column, returned)
+
+
+def _add(stack, admittance, impedance, tau) -> tuple[Bordered, Quotient]:
     h = 0.5 * tau
     total = stack + admittance
     middle = h * stack + 0.5 * (impedance + h * admittance)
-    added = total + admittance - h * between(total, middle, total)
-    return eqx.tree_at(lambda m: m.diagonal, added, jnp.ones_like(added.diagonal))
+    product, quotient = between_and_quotient(total, middle, total)
+    added = total + admittance - h * product
+    return eqx.tree_at(lambda m: m.diagonal, added, jnp.ones_like(added.diagonal)), quotient
 
 
-def reflection_corner(stack: Bordered, mu: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-    r"""Sun -> view entry of R = 2(1 + Y)^{-1} - 1 at the top of a stack."""
+class Top(eqx.Module):
+    """A finished stack under free space: (1 + Y)^-1 and Y."""
+
+    stack: Bordered
+    inverse: Float[Array, "node node *batch"]
+
+    def reflection(self) -> Float[Array, "view *batch"]:
+        r"""Sun -> view entries of (1 + Y)^{-1}, times mu; those of R are twice as large."""
+        border = self.stack.border
+        sun = matmul(self.inverse, border[:, :1])
+        return 0.5 * (jnp.sum(border[:, 1:] * sun, axis=0) - self.stack.corner)
+
+    def emerging(
+        self,
+        emission: Emission,
+        one: Vector,
+        incident: Float[Array, "*batch"],
+        planck: Float[Array, "*batch"],
+    ) -> Float[Array, "beam *batch"]:
+        """Radiance towards each beam under isotropic light `incident`, air at `planck` on top."""
+        driving = 2 * (incident - planck) * one.nodes + emission.column.nodes
+        s = matmul(self.inverse, driving[:, None])
+        emerging = emission.column.beams - jnp.sum(self.stack.border * s, axis=0)
+        return planck + 0.5 * emerging / one.beams
+
+    def plane_albedo(self, one: Vector) -> Float[Array, "beam *batch"]:
+        """Share of light from each beam that leaves the top, taken by reciprocity."""
+        s = matmul(self.inverse, one.nodes[:, None])
+        return -jnp.sum(self.stack.border * s, axis=0) / one.beams
+
+    def spherical_albedo(self, emission: Emission) -> Float[Array, "*batch"]:
+        """What comes back to the ground of its isotropic radiance 1, seen from below."""
+        nodes = emission.column.nodes
+        s = matmul(self.inverse, nodes[:, None])[:, 0]
+        return emission.returned + jnp.sum(nodes * s, axis=0)
+
+
+def top(stack: Bordered) -> Top:
+    """Close a stack under free space."""
     num_nodes = stack.core.shape[0]
-    identity = jnp.eye(num_nodes, dtype=mu.dtype).reshape(num_nodes, num_nodes, *(1,) * mu.ndim)
-    sun = matmul(inverse(stack.core + identity), stack.border[:, :1])[:, 0]
-    return (jnp.sum(stack.border[:, 1] * sun, axis=0) - stack.corner) / (2 * mu)
+    ndim = stack.core.ndim - 2
+    identity = jnp.eye(num_nodes, dtype=stack.core.dtype)
+    identity = identity.reshape(num_nodes, num_nodes, *(1,) * ndim)
+    return Top(stack, inverse(stack.core + identity))

@@ -1,94 +1,216 @@
 """The azimuth modes of the multiple scattering, one stack each."""
 
+from typing import NamedTuple
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .adding import add_layer, reflection_corner
-from .bordered import Bordered
+from .adding import Emission, Top, add_emitting_layer, add_layer, top
+from .bordered import Bordered, Vector
 from .delta_m import ScaledLayers
-from .ground import lambertian
+from .ground import black
 from .layer import ModeKernels, conservative, half_layer, layer_matrix, node_functions
 from .legendre import associated_legendre
 
 
-def multiple_scattering(
-    layers: ScaledLayers,
-    albedo: Float[Array, "*batch"],
-    mu0: Float[Array, "*batch"],
-    mu: Float[Array, "*batch"],
-    relative_azimuth: Float[Array, "*batch"],
-    *,
-    num_modes: int,
-    num_doublings: int,
-    single_scattering: bool,
-) -> Float[Array, "*batch"]:
-    r"""Bidirectional reflectance factor of the layers over a Lambertian ground.
-
-    .. math:: \sum_m \frac{2-\delta_{m0}}{2\mu_0}(-1)^m \cos(m\,\Delta\phi)\, R_m
-
-    with :math:`\Delta\phi` = `relative_azimuth`, 0 in backscatter, and R_m the sun -> view entry of
-    the reflection in mode m.
+class Directions(eqx.Module):
+    """The beams, and how each is attenuated.
 
     Parameters
     ----------
-    layers
-        Scaled layers, top first, with as many moments as streams.
-    albedo, mu0, mu, relative_azimuth
-        Ground and directions. [-], [-], [-], [rad]
-    num_modes, num_doublings
-        Azimuth modes to sum; doublings of each layer.
+    cosines
+        mu0, then mu of each view. [-]
+    sun_secants
+        1 / mu0 in every layer, or the slant path of a beam over a spherical Earth. [-]
+    """
+
+    cosines: Float[Array, "beam *batch"]
+    sun_secants: Float[Array, "layer *batch"]
+
+    def secants(self, sun: Float[Array, "*batch"]) -> Float[Array, "beam *batch"]:
+        """Secants of all beams in a layer whose sun has this one."""
+        return jnp.concatenate([sun[None], 1 / self.cosines[1:]])
+
+
+class LegendreTables(NamedTuple):
+    """Legendre functions of all modes, split by the parity of l + m (even builds A, odd B)."""
+
+    nodes: tuple[Float[Array, "mode node degree"], Float[Array, "mode node degree"]]
+    beams: tuple[Float[Array, "mode beam degree *batch"], Float[Array, "mode beam degree *batch"]]
+
+    def kernels(self, m: int) -> tuple[ModeKernels, ModeKernels]:
+        """Of one mode, for A and for B."""
+        a, b = (mode_kernels(n[m], v[m]) for n, v in zip(self.nodes, self.beams, strict=True))
+        return a, b
+
+
+def mode_kernels(
+    nodes: Float[Array, "node degree"], beams: Float[Array, "beam degree *batch"]
+) -> ModeKernels:
+    """Kernels of one mode and parity from its rows of the tables."""
+    return ModeKernels(nodes[:, None, :] * nodes[None], nodes, beams)
+
+
+def legendre_tables(
+    num_streams: int, num_modes: int, cosines: Float[Array, "beam *batch"]
+) -> LegendreTables:
+    """Evaluate the functions of all modes at the nodes and at the beams."""
+    at_nodes = node_functions(num_streams, num_modes)
+    at_beams = associated_legendre(num_modes, num_streams, cosines)
+    nodes, beams = [], []
+    for parity in (0, 1):
+        rows = [(m, slice((m + parity) % 2, None, 2)) for m in range(num_modes)]
+        nodes.append(jnp.stack([jnp.asarray(at_nodes[m, d].T, cosines.dtype) for m, d in rows]))
+        beams.append(jnp.swapaxes(jnp.stack([at_beams[m, d] for m, d in rows]), 1, 2))
+    return LegendreTables(tuple(nodes), tuple(beams))
+
+
+def weighted_moments(layers: ScaledLayers) -> Float[Array, "parity layer degree *batch"]:
+    r""":math:`\omega(2l+1)\chi_l` of even and of odd degrees."""
+    num_degrees = layers.moments.shape[1]
+    degree = 2 * jnp.arange(num_degrees, dtype=layers.tau.dtype) + 1
+    weight = degree.reshape(-1, *(1,) * (layers.tau.ndim - 1)) * layers.ssa[:, None]
+    moments = weight * layers.moments
+    return jnp.stack([moments[:, 0::2], moments[:, 1::2]])
+
+
+def azimuthal_mean(
+    layers: ScaledLayers,
+    tables: LegendreTables,
+    directions: Directions,
+    ground: Bordered,
+    *,
+    num_doublings: int,
+    single_scattering: bool,
+) -> Top:
+    """Mode 0, the only one in which energy is kept.
+
+    Parameters
+    ----------
+    layers, tables, directions
+        Scaled layers, top first, with as many moments as streams; Legendre functions; beams.
+    ground
+        Its admittance in mode 0.
+    num_doublings, single_scattering
+        See `higher_modes`.
+    """
+    half = _half_layers_of_the_mean(tables, directions, num_doublings, single_scattering)
+
+    def add(stack, layer):
+        _, admittance, impedance = half(layer)
+        return add_layer(stack, admittance, impedance, layer[0]), None
+
+    stack, _ = jax.lax.scan(add, ground, _properties_of_the_mean(layers, directions), reverse=True)
+    return top(stack)
+
+
+def emitting_mean(
+    layers: ScaledLayers,
+    tables: LegendreTables,
+    directions: Directions,
+    ground: Bordered,
+    emission: Emission,
+    one: Vector,
+    planck_jumps: Float[Array, "layer *batch"] | None,
+    *,
+    num_doublings: int,
+    single_scattering: bool,
+) -> tuple[Top, Emission]:
+    """Mode 0 with light that the ground and the layers emit, or that the ground loses.
+
+    Parameters
+    ----------
+    layers, tables, directions, ground, num_doublings, single_scattering
+        As in `azimuthal_mean`.
+    emission, one
+        Light of the ground (`adding.emitting_ground`); the vector of isotropic light.
+    planck_jumps
+        Increase of the Planck function from top to bottom of each layer; None for cold air.
+    """
+    half = _half_layers_of_the_mean(tables, directions, num_doublings, single_scattering)
+
+    def add(carry, x):
+        (stack, emission), (layer, planck_jump) = carry, x
+        b_inverse, admittance, impedance = half(layer)
+        jump = None if planck_jump is None else planck_jump * (b_inverse @ one)
+        return add_emitting_layer(stack, emission, admittance, impedance, layer[0], jump), None
+
+    xs = (_properties_of_the_mean(layers, directions), planck_jumps)
+    (stack, emission), _ = jax.lax.scan(add, (ground, emission), xs, reverse=True)
+    return top(stack), emission
+
+
+def _properties_of_the_mean(layers: ScaledLayers, directions: Directions) -> tuple[Array, ...]:
+    return (layers.tau, layers.coalbedo, directions.sun_secants, *weighted_moments(layers))
+
+
+def _half_layers_of_the_mean(tables, directions, num_doublings, single_scattering):
+    kernels_a, kernels_b = tables.kernels(0)
+
+    def half(layer) -> tuple[Bordered, Bordered, Bordered]:
+        tau, coalbedo, sun, moments_a, moments_b = layer
+        secants = directions.secants(sun)
+        a = layer_matrix(kernels_a, moments_a, secants, single_scattering)
+        a = conservative(a, coalbedo)
+        b_inverse = layer_matrix(kernels_b, moments_b, secants, single_scattering).inverse()
+        return b_inverse, *half_layer(a, b_inverse, tau, num_doublings)
+
+    return half
+
+
+def higher_modes(
+    layers: ScaledLayers,
+    tables: LegendreTables,
+    directions: Directions,
+    grounds: Bordered | None,
+    relative_azimuth: Float[Array, "view *batch"],
+    *,
+    num_doublings: int,
+    single_scattering: bool,
+) -> Float[Array, "view *batch"]:
+    r"""Sum over the modes m > 0 of :math:`(-1)^m \cos(m\,\Delta\phi)` times twice their reflection.
+
+    Parameters
+    ----------
+    layers, tables, directions
+        See `azimuthal_mean`.
+    grounds
+        Admittances of the ground, modes 1, 2, ... on the first axis of every leaf; None for a
+        Lambertian ground, which these modes do not see.
+    relative_azimuth
+        Of each view, 0 in backscatter. [rad]
+    num_doublings
+        Doublings of each layer.
     single_scattering
         Whether the modes contain the light scattered once in a layer and nowhere else.
     """
-    dtype = mu0.dtype
-    num_streams = layers.moments.shape[1]
-    secants = jnp.stack([1 / mu0, 1 / mu])
-    degree = 2 * jnp.arange(num_streams, dtype=dtype) + 1
-    weight = degree.reshape(-1, *(1,) * mu0.ndim) * layers.ssa[:, None]
-    moments = weight * layers.moments
-    by_degree_parity = jnp.stack([moments[:, 0::2], moments[:, 1::2]])
-
-    nodes = node_functions(num_streams, num_modes)
-    borders = associated_legendre(num_modes, num_streams, jnp.stack([mu0, mu]))
-    functions = []
-    for parity in (0, 1):
-        # Entry m of these holds the degrees with l + m even (parity 0) or odd.
-        node = jnp.stack(
-            [jnp.asarray(nodes[m, (m + parity) % 2 :: 2].T, dtype) for m in range(num_modes)]
-        )
-        border = jnp.stack([borders[m, (m + parity) % 2 :: 2] for m in range(num_modes)])
-        functions.append((node, jnp.swapaxes(border, 1, 2)))
-
-    def mode_reflection(m, kernels_a, kernels_b):
-        moments_a, moments_b = by_degree_parity[m % 2], by_degree_parity[1 - m % 2]
-        first = m == 0
-        ground = lambertian(jnp.where(first, albedo, 0), mu0, mu, num_streams)
-
-        def add(stack: Bordered, layer):
-            tau, coalbedo, chi_a, chi_b = layer
-            a = layer_matrix(kernels_a, chi_a, secants, single_scattering)
-            b = layer_matrix(kernels_b, chi_b, secants, single_scattering)
-            exact = conservative(a, coalbedo)
-            a = jax.tree.map(lambda x, y: jnp.where(first, x, y), exact, a)
-            admittance, impedance = half_layer(a, b, tau, num_doublings)
-            return add_layer(stack, admittance, impedance, tau), None
-
-        xs = (layers.tau, layers.coalbedo, moments_a, moments_b)
-        stack, _ = jax.lax.scan(add, ground, xs, reverse=True)
-        return reflection_corner(stack, mu)
-
-    def kernels(function):
-        node, border = function
-        return ModeKernels(node[:, None, :] * node[None], node, border)
+    moments = weighted_moments(layers)
+    dtype, num_streams = relative_azimuth.dtype, layers.moments.shape[1]
 
     def step(total, x):
-        m, function_a, function_b = x
-        reflection = mode_reflection(m, kernels(function_a), kernels(function_b))
-        sign = jnp.where(m % 2 == 0, 1, -1).astype(dtype)
-        factor = jnp.where(m == 0, 1, 2).astype(dtype) * sign
-        angle = m.astype(dtype) * relative_azimuth
-        return total + factor * jnp.cos(angle) * reflection / (2 * mu0), None
+        m, ground, nodes, beams = x
+        if ground is None:
+            ground = black(directions.cosines, num_streams)
+        kernels_a, kernels_b = (mode_kernels(n, v) for n, v in zip(nodes, beams, strict=True))
 
-    total, _ = jax.lax.scan(step, jnp.zeros_like(mu0), (jnp.arange(num_modes), *functions))
+        def add(stack, layer):
+            tau, sun, moments_a, moments_b = layer
+            secants = directions.secants(sun)
+            a = layer_matrix(kernels_a, moments_a, secants, single_scattering)
+            b_inverse = layer_matrix(kernels_b, moments_b, secants, single_scattering).inverse()
+            admittance, impedance = half_layer(a, b_inverse, tau, num_doublings)
+            return add_layer(stack, admittance, impedance, tau), None
+
+        xs = (layers.tau, directions.sun_secants, moments[m % 2], moments[1 - m % 2])
+        stack, _ = jax.lax.scan(add, ground, xs, reverse=True)
+        sign = jnp.where(m % 2 == 0, 2, -2).astype(dtype)
+        angle = m.astype(dtype) * relative_azimuth
+        return total + sign * jnp.cos(angle) * top(stack).reflection(), None
+
+    num_modes = tables.nodes[0].shape[0]
+    orders = jnp.arange(1, num_modes)
+    later = jax.tree.map(lambda table: table[1:], (tables.nodes, tables.beams))
+    total, _ = jax.lax.scan(step, jnp.zeros_like(relative_azimuth), (orders, grounds, *later))
     return total

@@ -1,18 +1,19 @@
-r"""Matrices whose last two nodes are the sun and the view.
+r"""Matrices whose last nodes are the sun and the views.
 
-The sun (cosine mu0) and the view (mu) join the quadrature nodes with weight zero: the sun feeds
-nodes and view and is fed by nothing, the view is fed by nodes and sun and feeds nothing. Acting on
-(nodes, sun, view), a matrix of that kind is
+The sun (cosine mu0) and any number of views (mu) join the quadrature nodes with weight zero: the
+sun feeds nodes and views and is fed by nothing, a view is fed by nodes and sun and feeds nothing.
+Acting on (nodes, sun, views), a matrix of that kind is
 
 .. math::
    \begin{pmatrix} c & b_s & 0 \\ 0 & d_s & 0 \\ b_v^T & x & d_v \end{pmatrix},
 
-and products, inverses and sums keep the form. So one algebra carries the multiple scattering (c),
-the particular solution for the sun (b_s), the integration of the source function towards the view
-(b_v), the exact attenuation of both beams (d) and the answer itself (x), and the classical
-resonances, mu0 at an eigenvalue or equal to mu, do not exist.
+with d_v diagonal, and products, inverses and sums keep the form. So one algebra carries the
+multiple scattering (c), the particular solution for the sun (b_s), the integration of the source
+function towards the views (b_v), the exact attenuation of all beams (d) and the answer itself (x),
+and the classical resonances, mu0 at an eigenvalue or equal to mu, do not exist.
 
-Nodes are scaled by sqrt(w mu) and the view's row by mu, which makes every core symmetric.
+Nodes are scaled by sqrt(w mu) and a view's row by mu, which makes every core symmetric. Sun and
+views are then the same kind of border, called *beams*: the sun is beam 0, the views follow.
 """
 
 import equinox as eqx
@@ -24,6 +25,30 @@ from .._numerics import fenced, inverse, matmul
 _inverse, _matmul = fenced(inverse), fenced(matmul)
 
 
+class Vector(eqx.Module):
+    """What a bordered matrix of symmetric kind acts on: one number a node and one a beam.
+
+    Parameters
+    ----------
+    nodes
+        At the nodes, times sqrt(w mu).
+    beams
+        At the beams, times their cosine.
+    """
+
+    nodes: Float[Array, "node *batch"]
+    beams: Float[Array, "beam *batch"]
+
+    def __add__(self, other: "Vector") -> "Vector":
+        return Vector(self.nodes + other.nodes, self.beams + other.beams)
+
+    def __sub__(self, other: "Vector") -> "Vector":
+        return Vector(self.nodes - other.nodes, self.beams - other.beams)
+
+    def __rmul__(self, factor: float | Float[Array, "*batch"]) -> "Vector":
+        return Vector(factor * self.nodes, factor * self.beams)
+
+
 class Bordered(eqx.Module):
     """A bordered matrix, batch last.
 
@@ -32,17 +57,17 @@ class Bordered(eqx.Module):
     core
         Nodes to nodes.
     border
-        Sun to nodes (first column) and nodes to view (second, the view's row).
+        Sun to nodes (first column) and nodes to views (the others, the views' rows).
     diagonal
-        Sun to sun and view to view.
+        Sun to sun and each view to itself.
     corner
-        Sun to view.
+        Sun to views.
     """
 
     core: Float[Array, "node node *batch"]
-    border: Float[Array, "node 2 *batch"]
-    diagonal: Float[Array, "2 *batch"]
-    corner: Float[Array, "*batch"]
+    border: Float[Array, "node beam *batch"]
+    diagonal: Float[Array, "beam *batch"]
+    corner: Float[Array, "view *batch"]
 
     def __add__(self, other: "Bordered") -> "Bordered":
         return Bordered(
@@ -63,17 +88,55 @@ class Bordered(eqx.Module):
             factor * self.corner,
         )
 
+    def __matmul__(self, vector: Vector) -> Vector:
+        """Action on light that no beam feeds into the nodes: thermal, or lost by the ground.
+
+        The sun's entry of the result is its border taken as a row, as if the sun were a view.
+        """
+        to_beams = jnp.sum(self.border * vector.nodes[:, None], axis=0)
+        return Vector(
+            _matmul(self.core, vector.nodes[:, None])[:, 0],
+            to_beams + self.diagonal * vector.beams,
+        )
+
     def inverse(self) -> "Bordered":
         """Inverse of a matrix with positive definite core and diagonal."""
         core = _inverse(self.core)
         solved = _matmul(core, self.border)
-        between = jnp.sum(self.border[:, 1] * solved[:, 0], axis=0)
+        between = jnp.sum(self.border[:, 1:] * solved[:, :1], axis=0)
         return Bordered(
             core,
             -solved / self.diagonal,
             1 / self.diagonal,
-            (between - self.corner) / (self.diagonal[0] * self.diagonal[1]),
+            (between - self.corner) / (self.diagonal[0] * self.diagonal[1:]),
         )
+
+
+class Quotient(eqx.Module):
+    """``middle^-1 right`` of a symmetric product, kept for acting on vectors.
+
+    Parameters
+    ----------
+    inverse
+        Inverse of the middle's core.
+    core
+        That inverse times the right core.
+    border
+        That inverse times (right border - middle border * ratio).
+    ratio
+        Right diagonal over the middle's.
+    """
+
+    inverse: Float[Array, "node node *batch"]
+    core: Float[Array, "node node *batch"]
+    border: Float[Array, "node beam *batch"]
+    ratio: Float[Array, "beam *batch"]
+
+    def transposed_action(self, vector: Vector) -> Vector:
+        """``right middle^-1`` applied to a vector without a sun (see `Bordered.__matmul__`)."""
+        nodes = jnp.sum(self.core * vector.nodes[:, None], axis=0)
+        beams = jnp.sum(self.border * vector.nodes[:, None], axis=0)
+        return Vector(nodes, beams + self.ratio * vector.beams)
 
 
 def between(left: Bordered, middle: Bordered, right: Bordered) -> Bordered:
@@ -82,25 +145,31 @@ def between(left: Bordered, middle: Bordered, right: Bordered) -> Bordered:
     `middle` has a positive definite core and diagonal. All three are functions of the same pair of
     matrices wherever this is called, so that the product is symmetric like its factors.
     """
-    sun = right.diagonal[0] / middle.diagonal[0]
-    view = left.diagonal[1] / middle.diagonal[1]
-    source = right.border[:, 0] - middle.border[:, 0] * sun
-    target = left.border[:, 1] - middle.border[:, 1] * view
+    return between_and_quotient(left, middle, right)[0]
+
+
+def between_and_quotient(
+    left: Bordered, middle: Bordered, right: Bordered
+) -> tuple[Bordered, Quotient]:
+    """`between`, and the quotient that it formed on the way (for `left` equal to `right`)."""
+    sun = right.diagonal[:1] / middle.diagonal[:1]
+    views = left.diagonal[1:] / middle.diagonal[1:]
+    source = right.border[:, :1] - middle.border[:, :1] * sun
+    targets = left.border[:, 1:] - middle.border[:, 1:] * views
     middle_inverse = _inverse(middle.core)
-    solved = _matmul(
-        middle_inverse,
-        jnp.concatenate([right.core, source[:, None], target[:, None]], axis=1),
-    )
     n = source.shape[0]
-    solved_source, solved_target = solved[:, n], solved[:, n + 1]
+    solved = _matmul(middle_inverse, jnp.concatenate([right.core, source, targets], axis=1))
+    solved_source, solved_targets = solved[:, n : n + 1], solved[:, n + 1 :]
     core = _matmul(left.core, solved[:, :n])
-    to_nodes = _matmul(left.core, solved_source[:, None])[:, 0] + left.border[:, 0] * sun
-    to_view = _matmul(right.core, solved_target[:, None])[:, 0] + right.border[:, 1] * view
+    to_nodes = _matmul(left.core, solved_source) + left.border[:, :1] * sun
+    to_views = _matmul(right.core, solved_targets) + right.border[:, 1:] * views
     corner = (
-        jnp.sum(target * solved_source, axis=0)
+        jnp.sum(targets * solved_source, axis=0)
         + left.corner * sun
-        + right.corner * view
-        - middle.corner * sun * view
+        + right.corner * views
+        - middle.corner * sun * views
     )
-    diagonal = jnp.stack([left.diagonal[0] * sun, view * right.diagonal[1]])
-    return Bordered(core, jnp.stack([to_nodes, to_view], axis=1), diagonal, corner)
+    diagonal = jnp.concatenate([left.diagonal[:1] * sun, views * right.diagonal[1:]])
+    product = Bordered(core, jnp.concatenate([to_nodes, to_views], axis=1), diagonal, corner)
+    ratio = jnp.concatenate([sun, views])
+    return product, Quotient(middle_inverse, solved[:, :n], solved[:, n:], ratio)

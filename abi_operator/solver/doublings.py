@@ -11,8 +11,8 @@ _REACH = (0.317, 0.648, 1.40, 65.8, 269.0)
 # Numbers of doublings that `num_doublings=None` chooses from: few, so that few programs compile.
 _BUCKETS = (1, 3, 5, 7, 9, 13)
 
-UNKNOWN = 13
-"""Doublings for layers that are not known when a program is traced: tau = 1e5 at mu0 = 1e-3."""
+# What a program must be right for when its layers are not known as it is traced.
+_UNKNOWN_TAU, _UNKNOWN_MU = 1e5, 1e-3
 
 
 def sufficient_doublings(max_tau: float, min_mu: float, num_streams: int) -> int:
@@ -34,3 +34,8 @@ def sufficient_doublings(max_tau: float, min_mu: float, num_streams: int) -> int
             return doublings
     excess = int(np.ceil(np.log(z / _REACH[4]) / np.log(4)))
     return 4 + excess
+
+
+def unknown_doublings(num_streams: int) -> int:
+    """Doublings for layers that nobody knows yet: enough for tau = 1e5 at a cosine of 1e-3."""
+    return sufficient_doublings(_UNKNOWN_TAU, _UNKNOWN_MU, num_streams)

@@ -1,31 +1,73 @@
-"""The ground under the stack."""
+"""The ground under the stack: its admittance and what it emits."""
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from .bordered import Bordered
+from .bordered import Bordered, Vector
 from .quadrature import double_gauss
+from .surface import Surface
+
+
+def isotropic(num_streams: int, beams: Float[Array, "beam *batch"]) -> Vector:
+    r"""Radiance 1 in all directions: :math:`\sqrt{w\mu}` at the nodes, mu at the beams."""
+    mu, weight = double_gauss(num_streams)
+    shape = (mu.size,) + (1,) * (beams.ndim - 1)
+    nodes = jnp.asarray(np.sqrt(weight * mu), beams.dtype).reshape(shape)
+    return Vector(jnp.broadcast_to(nodes, (mu.size, *beams.shape[1:])), beams)
+
+
+def _identity(num_nodes: int, like: Float[Array, "*batch"]) -> Float[Array, "node node *#batch"]:
+    return jnp.eye(num_nodes, dtype=like.dtype).reshape(num_nodes, num_nodes, *(1,) * like.ndim)
 
 
 def lambertian(
-    albedo: Float[Array, "*batch"],
-    mu0: Float[Array, "*batch"],
-    mu: Float[Array, "*batch"],
-    num_streams: int,
+    albedo: Float[Array, "*batch"], beams: Float[Array, "beam *batch"], num_streams: int
 ) -> Bordered:
     r"""Admittance of a Lambertian ground in azimuth mode 0; that of every other has albedo 0.
 
-    The reflection is R = 2a v r^T with v = 1 on nodes and view and r = (w mu, mu0, 0), so that
-    :math:`Y = 1 - 4a/(1+a)\, rr^T` in the symmetric scaling, :math:`r = (\sqrt{w\mu}, \mu_0,
-    \mu)`: regular at albedo 1.
+    The reflection is R = 2a v r^T with v = 1 on nodes and views and r = (w mu, mu0, 0), so that
+    :math:`Y = 1 - 4a/(1+a)\, rr^T` in the symmetric scaling, r = `isotropic`: regular at albedo 1.
     """
-    nodes, weights = double_gauss(num_streams)
-    shape = (nodes.size,) + (1,) * albedo.ndim
-    r = jnp.asarray(np.sqrt(weights * nodes), albedo.dtype).reshape(shape)
-    identity = jnp.eye(nodes.size, dtype=albedo.dtype).reshape(shape[:1] + shape)
+    r = isotropic(num_streams, beams)
     factor = 4 * albedo / (1 + albedo)
-    core = identity - factor * r[:, None] * r[None]
-    border = -factor * r[:, None] * jnp.stack([mu0, mu])
-    ones = jnp.ones_like(mu0)
-    return Bordered(core, border, jnp.stack([ones, ones]), -factor * mu0 * mu)
+    core = _identity(r.nodes.shape[0], albedo) - factor * r.nodes[:, None] * r.nodes[None]
+    border = -factor * r.nodes[:, None] * beams[None]
+    return Bordered(core, border, jnp.ones_like(beams), -factor * beams[0] * beams[1:])
+
+
+def black(beams: Float[Array, "beam *batch"], num_streams: int) -> Bordered:
+    """Admittance 1: no reflection, as a Lambertian ground has in the modes m > 0."""
+    return lambertian(jnp.zeros_like(beams[0]), beams, num_streams)
+
+
+def reflecting(
+    surface: Surface,
+    m: Int[Array, ""] | int,
+    beams: Float[Array, "beam *batch"],
+    num_streams: int,
+) -> Bordered:
+    r"""Admittance :math:`2(1+R)^{-1} - 1` of any reciprocal ground in azimuth mode m.
+
+    R_ij = 2 r_i r_j rho_m (-1)^m with r = `isotropic`. Its sun -> view entry is 0: light that the
+    ground alone sends from the sun to a view is added exactly (`single_scatter.direct_reflection`).
+    """
+    r = isotropic(num_streams, beams)
+    nodes = jnp.asarray(double_gauss(num_streams)[0], beams.dtype)
+    nodes = jnp.broadcast_to(nodes.reshape(-1, *(1,) * (beams.ndim - 1)), r.nodes.shape)
+    sign = jnp.where(jnp.asarray(m) % 2 == 0, 1, -1).astype(beams.dtype)
+    among_nodes = sign * surface.modes(m, nodes[:, None], nodes[None])
+    with_beams = sign * surface.modes(m, nodes[:, None], beams[None])
+    one_plus = Bordered(
+        _identity(nodes.shape[0], beams[0]) + 2 * among_nodes * r.nodes[:, None] * r.nodes[None],
+        2 * with_beams * r.nodes[:, None] * beams[None],
+        jnp.ones_like(beams),
+        jnp.zeros_like(beams[1:]),
+    )
+    inverse = one_plus.inverse()
+    return Bordered(
+        2 * inverse.core - _identity(nodes.shape[0], beams[0]),
+        2 * inverse.border,
+        inverse.diagonal,
+        2 * inverse.corner,
+    )

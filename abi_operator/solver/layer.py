@@ -42,13 +42,13 @@ class ModeKernels(eqx.Module):
         Products for two nodes.
     nodes
         Functions at the nodes.
-    borders
-        Functions at mu0 (first row) and mu (second).
+    beams
+        Functions at the beams: mu0 first, then the views.
     """
 
     pairs: Float[Array, "node node degree"]
     nodes: Float[Array, "node degree"]
-    borders: Float[Array, "2 degree *batch"]
+    beams: Float[Array, "beam degree *batch"]
 
 
 def node_functions(num_streams: int, num_modes: int) -> np.ndarray:
@@ -60,7 +60,7 @@ def node_functions(num_streams: int, num_modes: int) -> np.ndarray:
 def layer_matrix(
     kernels: ModeKernels,
     moments: Float[Array, "degree *batch"],
-    secants: Float[Array, "2 *batch"],
+    secants: Float[Array, "beam *batch"],
     single_scattering: bool,
 ) -> Bordered:
     r"""Build A (or B) of one layer from the moments of its parity.
@@ -72,7 +72,8 @@ def layer_matrix(
     moments
         :math:`\omega(2l+1)\chi_l` of the same degrees.
     secants
-        1 / mu0 and 1 / mu.
+        By which the beams are attenuated: 1 / mu0, or the layer's own for a sun over a spherical
+        Earth, and 1 / mu of each view.
     single_scattering
         Whether sun -> view is scattered here; False where single scattering is added exactly.
     """
@@ -80,11 +81,11 @@ def layer_matrix(
     mu = jnp.asarray(double_gauss(2 * num_nodes)[0], moments.dtype)
     inverse_mu = jnp.diag(1 / mu).reshape(num_nodes, num_nodes, *(1,) * (moments.ndim - 1))
     core = inverse_mu - jnp.tensordot(kernels.pairs, moments, axes=1)
-    weighted = jnp.swapaxes(moments * kernels.borders, 0, 1)
+    weighted = jnp.swapaxes(moments * kernels.beams, 0, 1)
     border = -jnp.tensordot(kernels.nodes, weighted, axes=1)
-    corner = jnp.zeros_like(secants[0])
+    corner = jnp.zeros_like(secants[1:])
     if single_scattering:
-        corner = -jnp.sum(moments * kernels.borders[0] * kernels.borders[1], axis=0)
+        corner = -jnp.sum(moments * kernels.beams[0] * kernels.beams[1:], axis=1)
     return Bordered(core, border, secants, corner)
 
 
@@ -108,9 +109,9 @@ def conservative(matrix: Bordered, coalbedo: Float[Array, "*batch"]) -> Bordered
 
 
 def half_layer(
-    a: Bordered, b: Bordered, tau: Float[Array, "*batch"], num_doublings: int
+    a: Bordered, b_inverse: Bordered, tau: Float[Array, "*batch"], num_doublings: int
 ) -> tuple[Bordered, Bordered]:
-    r"""Admittance Y and h-fold impedance Z of half a layer of optical depth `tau`.
+    r"""Admittance Y and h-fold impedance Z of half a layer, from A and the inverse of B.
 
     The start uses the continued fraction of :math:`\sqrt x\coth\sqrt x` down to 9,
 
@@ -129,7 +130,6 @@ def half_layer(
     """
     h = tau * (0.5 / 2**num_doublings)
     square = h * h
-    b_inverse = b.inverse()
     inner = (1 / 7) * a - (square / 49) * between(a, 9.0 * b_inverse + (square / 7) * a, a)
     inner = 5.0 * b_inverse + square * ((1 / 3) * a + inner)
     fraction = (1 / 3) * a - (square / 9) * between(a, inner, a)

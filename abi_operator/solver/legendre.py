@@ -33,7 +33,9 @@ def associated_legendre(
         Cosines; NumPy arrays are evaluated by NumPy, in their own precision. [-]
     """
     xp = np if isinstance(mu, np.ndarray) else jnp
-    sine = np.sqrt(1 - mu * mu) if isinstance(mu, np.ndarray) else safe_sqrt(1 - mu * mu)
+    # (1 - mu)(1 + mu) loses no digits near the vertical, 1 - mu^2 half of them.
+    square = (1 - mu) * (1 + mu)
+    sine = np.sqrt(square) if isinstance(square, np.ndarray) else safe_sqrt(square)
     diagonal = [xp.ones_like(mu)]
     for m in range(1, num_modes):
         diagonal.append(diagonal[-1] * sine * np.sqrt((2 * m - 1) / (2 * m)).item())
@@ -58,18 +60,18 @@ def associated_legendre(
 
 
 def legendre_series(
-    moments: Float[Array, "layer moment *batch"], cosine: Float[Array, "*batch"]
-) -> Float[Array, "layer *batch"]:
+    moments: Float[Array, "layer moment *batch"], cosine: Float[Array, "view *batch"]
+) -> Float[Array, "layer view *batch"]:
     r"""Sum a phase function from its moments, :math:`\sum_l (2l+1)\chi_l P_l(\cos\Theta)`."""
 
     def step(carry, x):
         total, before, here = carry
         degree, chi = x
-        total = total + (2 * degree + 1) * chi * here
+        total = total + (2 * degree + 1) * chi[:, None] * here
         following = ((2 * degree + 1) * cosine * here - degree * before) / (degree + 1)
         return (total, here, following), None
 
     degrees = jnp.arange(1, moments.shape[1], dtype=cosine.dtype)
-    start = jnp.ones_like(moments[:, 0] * cosine), jnp.ones_like(cosine), cosine
+    start = jnp.ones_like(moments[:, :1] * cosine), jnp.ones_like(cosine), cosine
     (total, *_), _ = jax.lax.scan(step, start, (degrees, jnp.moveaxis(moments[:, 1:], 1, 0)))
     return total

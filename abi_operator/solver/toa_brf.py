@@ -1,27 +1,31 @@
-"""The door of the solver: reflectance of plane-parallel columns at the top of the atmosphere."""
+"""The solver's door for reflectances: plane-parallel columns seen from the top."""
 
 from functools import partial
 
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from .._batching import map_tiles, tile_size
-from .azimuth import multiple_scattering
-from .delta_m import delta_m as scale_delta_m
-from .delta_m import unscaled
-from .doublings import UNKNOWN, sufficient_doublings
-from .legendre import legendre_series
-from .single_scatter import cos_scattering_angle, exact_single_scattering
+from .checks import check_arguments
+from .column import (
+    Column,
+    Options,
+    aligned,
+    check_options,
+    check_shapes,
+    choose_doublings,
+    promoted,
+)
+from .program import emerging
+from .surface import Surface
 
 
 def toa_brf(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
     moments: Float[ArrayLike, "*batch layer moment"],
-    albedo: Float[ArrayLike, "*batch"],
+    albedo: Float[ArrayLike, "*batch"] | Surface,
     mu0: Float[ArrayLike, "*batch"],
     mu: Float[ArrayLike, "*batch"],
     relative_azimuth: Float[ArrayLike, "*batch"],
@@ -31,13 +35,17 @@ def toa_brf(
     delta_m: bool = True,
     single_scattering: str | None = "tms",
     phase_function: Float[ArrayLike, "*batch layer"] | None = None,
+    secant: Float[ArrayLike, "*batch layer"] | None = None,
+    multiple_views: bool = False,
     num_doublings: int | None = None,
+    check_values: bool = False,
 ) -> Float[Array, "*batch"]:
     r"""Bidirectional reflectance factor :math:`\pi I/(\mu_0 F_0)` at the top of the atmosphere.
 
-    Scalar discrete ordinates over a Lambertian ground, differentiable (forward and reverse) in
-    every floating argument. Leading axes broadcast by NumPy's rules; layers are numbered from the
-    top. Values are not checked, and a reflectance may be slightly negative at few streams.
+    Scalar discrete ordinates, differentiable (forward and reverse) in every floating argument.
+    Leading axes broadcast by NumPy's rules; layers are numbered from the top. Values are not
+    checked unless asked for, and a reflectance may be slightly negative at few streams: it is
+    reported as it is.
 
     Parameters
     ----------
@@ -47,7 +55,7 @@ def toa_brf(
         Legendre moments of each layer's phase function, chi_0 = 1 (not read), without the factor
         2l + 1: `num_streams` + 1 at least, `num_streams` without delta-M. [-]
     albedo
-        Lambertian albedo of the ground. [-]
+        Lambertian albedo of the ground [-], or a `Surface`.
     mu0, mu
         Cosines of the solar and view zenith angles, both above 0. At 1, where the derivative in
         the cosine is infinite, a finite one is returned. [-]
@@ -63,13 +71,21 @@ def toa_brf(
     single_scattering
         ``"tms"`` replaces light scattered once by its exact value; None leaves it to the streams.
     phase_function
-        Exact phase function of each layer at the scattering angle
-        (`cos_scattering_angle`), mean 1 over the sphere; None sums all the moments given, which
-        must then be enough of them: 64 or more for a cloud. [-]
+        Exact phase function of each layer at the scattering angle (`cos_scattering_angle`), mean 1
+        over the sphere, from a closed form or a table (`interpolate_phase_function`); None sums
+        all the moments given, which must then be enough of them: 64 or more for a cloud. [-]
+    secant
+        Replaces 1 / mu0 in the attenuation of the sun's beam, layer by layer, for a sun low over a
+        spherical Earth (`slant_path_secant`). [-]
+    multiple_views
+        Whether `mu`, `relative_azimuth` and `phase_function` have one more axis, the last, over
+        views of the same columns; the result keeps it. Many views cost little more than one.
     num_doublings
         Doublings of each layer (see `layer.half_layer`). None chooses from the largest layer where
         the arguments are concrete, and enough for layers of 1e5 where they are traced. Too small a
         number is an error that nothing reports.
+    check_values
+        Whether to refuse values out of range, which needs concrete arguments; see `checks`.
 
     Returns
     -------
@@ -78,143 +94,76 @@ def toa_brf(
     Raises
     ------
     ValueError
-        If shapes do not match, there are too few moments, or an option is out of range.
+        If shapes do not match, there are too few moments, or an option is out of range; with
+        `check_values`, also if a value is.
     """
-    arrays = [tau, ssa, moments, albedo, mu0, mu, relative_azimuth]
-    if phase_function is not None:
-        arrays.append(phase_function)
-    arrays = _promoted(arrays)
-    _check(arrays, num_streams, num_modes, delta_m, single_scattering)
-    if num_doublings is not None and num_doublings < 0:
-        raise ValueError(f"num_doublings must be 0 or more; got {num_doublings}.")
-    if num_doublings is None:
-        num_doublings = _doublings(arrays, num_streams)
-    return _solve(
-        *arrays,
-        num_streams=num_streams,
-        num_modes=num_streams if num_modes is None else num_modes,
-        use_delta_m=delta_m,
-        tms=single_scattering == "tms",
-        num_doublings=num_doublings,
+    column = promoted(
+        tau=tau,
+        ssa=ssa,
+        moments=moments,
+        albedo=albedo,
+        mu0=mu0,
+        mu=mu,
+        relative_azimuth=relative_azimuth,
+        phase_function=phase_function,
+        secant=secant,
     )
+    options = prepare(
+        column,
+        num_streams=num_streams,
+        num_modes=num_modes,
+        delta_m=delta_m,
+        single_scattering=single_scattering,
+        multiple_views=multiple_views,
+        num_doublings=num_doublings,
+        check_values=check_values,
+    )
+    return _solve(column, options, multiple_views)
 
 
-def _promoted(arguments: list) -> list[Array | np.ndarray]:
-    """Give all arguments their common floating type, before any JAX operation.
-
-    Python numbers have no type of their own and follow the arrays; integers become floating.
-    """
-    arrays = [x if isinstance(x, jax.Array) else np.asarray(x) for x in arguments]
-    types = [
-        argument if isinstance(argument, int | float) else array.dtype
-        for argument, array in zip(arguments, arrays, strict=True)
-    ]
-    dtype = jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
-    return [x.astype(dtype) for x in arrays]
-
-
-def _check(arrays, num_streams, num_modes, delta_m, single_scattering) -> None:
-    tau, ssa, moments, *angles_and_albedo = arrays[:7]
-    if num_streams < 2 or num_streams % 2:
-        raise ValueError(f"num_streams must be even and at least 2; got {num_streams}.")
-    if num_modes is not None and not 1 <= num_modes <= num_streams:
-        raise ValueError(f"num_modes must be 1 to num_streams = {num_streams}; got {num_modes}.")
-    if single_scattering not in ("tms", None):
-        raise ValueError(f"single_scattering must be 'tms' or None; got {single_scattering!r}.")
-    if tau.ndim < 1 or ssa.ndim < 1 or moments.ndim < 2:
-        raise ValueError(
-            "tau and ssa need a layer axis, moments a layer and a moment axis; got shapes "
-            f"{tau.shape}, {ssa.shape}, {moments.shape}."
-        )
-    layers = {tau.shape[-1], ssa.shape[-1], moments.shape[-2]}
-    layers |= {x.shape[-1] for x in arrays[7:] if x.ndim}
-    if len(layers - {1}) > 1:
-        raise ValueError(
-            "tau, ssa, moments and phase_function must have the same number of layers; got shapes "
-            f"{tau.shape}, {ssa.shape}, {moments.shape}, {[x.shape for x in arrays[7:]]}."
-        )
-    needed = num_streams + 1 if delta_m else num_streams
-    if moments.shape[-1] < needed:
-        raise ValueError(
-            f"{num_streams} streams need at least {needed} moments (delta_m={delta_m}); got "
-            f"{moments.shape[-1]} in moments of shape {moments.shape}. Pad Rayleigh with zeros."
-        )
-    leading = [tau.shape[:-1], ssa.shape[:-1], moments.shape[:-2]]
-    leading += [x.shape for x in angles_and_albedo] + [x.shape[:-1] for x in arrays[7:]]
-    try:
-        np.broadcast_shapes(*leading)
-    except ValueError:
-        raise ValueError(
-            "leading axes of tau, ssa, moments, albedo, mu0, mu, relative_azimuth"
-            f"{' and phase_function' if arrays[7:] else ''} do not broadcast: {leading}."
-        ) from None
-
-
-def _doublings(arrays: list, num_streams: int) -> int:
-    tau, mu0, mu = arrays[0], arrays[4], arrays[5]
-    if any(isinstance(x, Tracer) for x in (tau, mu0, mu)) or tau.size == 0:
-        return UNKNOWN
-    min_mu = min(float(np.min(mu0)), float(np.min(mu)))
-    return sufficient_doublings(float(np.max(tau)), min_mu, num_streams)
-
-
-@partial(
-    jax.jit, static_argnames=("num_streams", "num_modes", "use_delta_m", "tms", "num_doublings")
-)
-def _solve(
-    tau,
-    ssa,
-    moments,
-    albedo,
-    mu0,
-    mu,
-    relative_azimuth,
-    phase_function=None,
+def prepare(
+    column: Column,
     *,
     num_streams: int,
-    num_modes: int,
-    use_delta_m: bool,
-    tms: bool,
-    num_doublings: int,
-) -> Array:
-    # Outside, batch axes lead and broadcast; inside there is one, and it comes last.
-    columns = [albedo, mu0, mu, relative_azimuth]
-    batch = jnp.broadcast_shapes(
-        tau.shape[:-1], ssa.shape[:-1], moments.shape[:-2], *(x.shape for x in columns)
+    num_modes: int | None,
+    delta_m: bool,
+    single_scattering: str | None,
+    multiple_views: bool,
+    num_doublings: int | None,
+    check_values: bool,
+    checked: Column | None = None,
+) -> Options:
+    """What every door does with its promoted arguments before the program: check and choose.
+
+    Values are checked in `checked` where the column to solve is not what the caller gave.
+    """
+    check_options(num_streams, num_modes, single_scattering, num_doublings)
+    check_shapes(column, num_streams + 1 if delta_m else num_streams, multiple_views)
+    if check_values:
+        given = (column if checked is None else checked)._asdict()
+        summed = single_scattering == "tms" and column.phase_function is None
+        check_arguments({k: x for k, x in given.items() if x is not None}, series_summed=summed)
+    if num_doublings is None:
+        num_doublings = choose_doublings(column, num_streams)
+    return Options(
+        num_streams,
+        num_streams if num_modes is None else num_modes,
+        delta_m,
+        single_scattering == "tms",
+        num_doublings,
     )
-    num_layers = max(tau.shape[-1], ssa.shape[-1], moments.shape[-2])
 
-    def inward(x, *own):
-        full = jnp.broadcast_to(x, batch + own)
-        return jnp.moveaxis(full.reshape(-1, *own), 0, -1)
 
-    albedo, mu0, mu, relative_azimuth = (inward(x) for x in columns)
-    tau, ssa = inward(tau, num_layers), inward(ssa, num_layers)
-    moments = inward(moments, num_layers, moments.shape[-1])
-    moments = jnp.concatenate([jnp.ones_like(moments[:, :1]), moments[:, 1:]], axis=1)
+@partial(jax.jit, static_argnums=(1, 2))
+def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
+    columns, batch = aligned(column, multiple_views)
+    brf = map_tiles(
+        lambda tile: emerging(tile, options).brf, columns, tile_size(options.num_streams)
+    )
+    return outward(brf, batch, multiple_views)
 
-    arrays = (tau, ssa, moments, albedo, mu0, mu, relative_azimuth)
-    if tms and phase_function is not None:
-        arrays += (inward(phase_function, num_layers),)
 
-    def solve_tile(tau, ssa, moments, albedo, mu0, mu, relative_azimuth, exact=None):
-        scale = scale_delta_m if use_delta_m else unscaled
-        layers = scale(tau, ssa, moments, num_streams)
-        brf = multiple_scattering(
-            layers,
-            albedo,
-            mu0,
-            mu,
-            relative_azimuth,
-            num_modes=num_modes,
-            num_doublings=num_doublings,
-            single_scattering=not tms,
-        )
-        if not tms:
-            return brf
-        if exact is None:
-            exact = legendre_series(moments, cos_scattering_angle(mu0, mu, relative_azimuth))
-        ratio = layers.scattering_ratio
-        return brf + exact_single_scattering(layers.tau, ratio, exact, mu0, mu)
-
-    return map_tiles(solve_tile, arrays, tile_size(num_streams)).reshape(batch)
+def outward(x: Array, batch: tuple[int, ...], multiple_views: bool) -> Array:
+    """From ``view batch`` to the batch's axes, and the views' where there are several."""
+    x = jnp.moveaxis(x, -1, 0)
+    return x.reshape(*batch, *x.shape[1:]) if multiple_views else x.reshape(batch)

@@ -1,0 +1,166 @@
+"""Fluxes that the azimuthal mean knows: plane albedo, and the ground's part in a reflectance."""
+
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from .._batching import map_tiles, tile_size
+from .column import Column, Options, aligned, promoted
+from .program import GroundResponse, ground_response, plane_albedo
+from .surface import Surface
+from .toa_brf import outward, prepare
+
+
+def toa_albedo(
+    tau: Float[ArrayLike, "*batch layer"],
+    ssa: Float[ArrayLike, "*batch layer"],
+    moments: Float[ArrayLike, "*batch layer moment"],
+    albedo: Float[ArrayLike, "*batch"] | Surface,
+    mu0: Float[ArrayLike, "*batch"],
+    *,
+    num_streams: int = 16,
+    delta_m: bool = True,
+    secant: Float[ArrayLike, "*batch layer"] | None = None,
+    num_doublings: int | None = None,
+    check_values: bool = False,
+) -> Float[Array, "*batch"]:
+    r"""Plane albedo at the top: upward flux over :math:`\mu_0 F_0`. [-]
+
+    One mode and no view are solved. Arguments, derivatives and errors are those of `toa_brf`.
+    """
+    no_view = np.zeros(0, np.float16)
+    column = promoted(
+        tau=tau,
+        ssa=ssa,
+        moments=moments,
+        albedo=albedo,
+        mu0=mu0,
+        mu=no_view,
+        relative_azimuth=no_view,
+        secant=secant,
+    )
+    options = prepare(
+        column,
+        num_streams=num_streams,
+        num_modes=1,
+        delta_m=delta_m,
+        single_scattering=None,
+        multiple_views=True,
+        num_doublings=num_doublings,
+        check_values=check_values,
+    )
+    return _plane_albedo(column, options)
+
+
+class SurfaceCoupling(eqx.Module):
+    r"""Reflectance of columns as a closed form in the albedo of a Lambertian ground.
+
+    .. math:: BRF(a) = BRF(0) + \frac{c\,a}{1 - S a}
+
+    Parameters
+    ----------
+    brf_black
+        Reflectance over black ground, BRF(0). [-]
+    coupling
+        c, transmission from the sun to the ground times that from the ground to the view. [-]
+    spherical_albedo
+        S, the albedo of the atmosphere seen from below. [-]
+    """
+
+    brf_black: Float[Array, "*batch"]
+    coupling: Float[Array, "*batch"]
+    spherical_albedo: Float[Array, "*batch"]
+    multiple_views: bool = eqx.field(static=True, default=False)
+
+    def brf(self, albedo: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch"]:
+        """Reflectance over ground of this albedo; leading axes broadcast. [-]"""
+        albedo = jnp.asarray(albedo).astype(self.brf_black.dtype)
+        factor = albedo / (1 - self.spherical_albedo * albedo)
+        if self.multiple_views:
+            factor = factor[..., None]
+        return self.brf_black + self.coupling * factor
+
+    def albedo(self, brf: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch"]:
+        """Ground albedo that gives this reflectance: the inverse, for atmospheric correction. [-]
+
+        Not limited to [0, 1]: a reflectance that no ground of such an albedo explains gives one
+        outside.
+        """
+        spherical = self.spherical_albedo
+        if self.multiple_views:
+            spherical = spherical[..., None]
+        excess = jnp.asarray(brf).astype(self.brf_black.dtype) - self.brf_black
+        return excess / (self.coupling + spherical * excess)
+
+
+def surface_coupling(
+    tau: Float[ArrayLike, "*batch layer"],
+    ssa: Float[ArrayLike, "*batch layer"],
+    moments: Float[ArrayLike, "*batch layer moment"],
+    mu0: Float[ArrayLike, "*batch"],
+    mu: Float[ArrayLike, "*batch"],
+    relative_azimuth: Float[ArrayLike, "*batch"],
+    *,
+    num_streams: int = 16,
+    num_modes: int | None = None,
+    delta_m: bool = True,
+    single_scattering: str | None = "tms",
+    phase_function: Float[ArrayLike, "*batch layer"] | None = None,
+    secant: Float[ArrayLike, "*batch layer"] | None = None,
+    multiple_views: bool = False,
+    num_doublings: int | None = None,
+    check_values: bool = False,
+) -> SurfaceCoupling:
+    """How a Lambertian ground of any albedo shows through these columns, in one solve.
+
+    Columns that share atmosphere and angles and differ in albedo cost one solve, and an observed
+    reflectance is corrected for the atmosphere without another. Arguments, derivatives and errors
+    are those of `toa_brf`.
+
+    References
+    ----------
+    .. [1] S. Chandrasekhar, "Radiative Transfer", Dover, 1960, section 72.
+    """
+    column = promoted(
+        tau=tau,
+        ssa=ssa,
+        moments=moments,
+        albedo=0,
+        mu0=mu0,
+        mu=mu,
+        relative_azimuth=relative_azimuth,
+        phase_function=phase_function,
+        secant=secant,
+    )
+    options = prepare(
+        column,
+        num_streams=num_streams,
+        num_modes=num_modes,
+        delta_m=delta_m,
+        single_scattering=single_scattering,
+        multiple_views=multiple_views,
+        num_doublings=num_doublings,
+        check_values=check_values,
+    )
+    black, coupling, spherical = _ground_response(column, options, multiple_views)
+    return SurfaceCoupling(black, coupling, spherical, multiple_views)
+
+
+@partial(jax.jit, static_argnums=1)
+def _plane_albedo(column: Column, options: Options) -> Array:
+    columns, batch = aligned(column, True)
+    tile = tile_size(options.num_streams)
+    return map_tiles(lambda tiles: plane_albedo(tiles, options), columns, tile).reshape(batch)
+
+
+@partial(jax.jit, static_argnums=(1, 2))
+def _ground_response(column: Column, options: Options, multiple_views: bool) -> GroundResponse:
+    columns, batch = aligned(column, multiple_views)
+    tile = tile_size(options.num_streams)
+    found = map_tiles(lambda tiles: ground_response(tiles, options), columns, tile)
+    black, coupling = (outward(x, batch, multiple_views) for x in found[:2])
+    return GroundResponse(black, coupling, found.spherical_albedo.reshape(batch))

@@ -1,0 +1,160 @@
+"""Checks of the values of the solver's arguments, outside any compilation.
+
+They read every number on the host, so they are asked for, not always made: without
+``check_values=True`` nothing here is called. The first argument that offends is reported, in the
+order of the call.
+"""
+
+from typing import Any
+
+import jax
+import numpy as np
+from jax.core import Tracer
+
+_FINITE = (-np.inf, np.inf, "()")
+_NOT_NEGATIVE = (0.0, np.inf, "[)")
+_UNIT_INTERVAL = (0.0, 1.0, "[]")
+_COSINE = (0.0, 1.0, "(]")
+
+# Lowest and highest value, and which of the two belong to the range.
+RANGES = {
+    "tau": _NOT_NEGATIVE,
+    "ssa": _UNIT_INTERVAL,
+    "moments": (-1.0, 1.0, "[]"),
+    "albedo": _UNIT_INTERVAL,
+    "mu0": _COSINE,
+    "mu": _COSINE,
+    "relative_azimuth": _FINITE,
+    "phase_function": _NOT_NEGATIVE,
+    "secant": (0.0, np.inf, "()"),
+    "solar_irradiance": _NOT_NEGATIVE,
+    "planck_levels": _NOT_NEGATIVE,
+    "surface_emission": _NOT_NEGATIVE,
+    "isotropic_top": _NOT_NEGATIVE,
+}
+
+# Largest last term (2l + 1) |chi_l| of a series from which a phase function is summed.
+LAST_TERM = 1e-3
+
+
+def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
+    r"""Refuse values that are not finite or lie outside their physical range.
+
+    tau, phase_function, solar_irradiance, planck_levels, surface_emission and isotropic_top must be
+    0 or more, secant above 0, ssa and a Lambertian albedo in [0, 1], moments in [-1, 1], mu0 and mu
+    in (0, 1]; all must be finite. Exceptions: chi_0, which the solver does not read, need only be
+    finite, and so need mu0 where solar_irradiance is 0. Each number is judged in its own precision:
+    one step above 1 is outside [0, 1].
+
+    Parameters
+    ----------
+    arguments
+        Arguments of the solver by name, with shapes that broadcast as the solver has them; None
+        for one that is not given. `albedo` is an array or a surface, of which every array must be
+        finite.
+    series_summed
+        Whether phase functions are summed from the moments given. Then the last of them must have
+        :math:`(2l+1)|\chi_l| \le` 1e-3 in every layer that scatters.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, the index of the first offender, its value, the number of others and
+        the allowed range; or the argument that is traced (under `jax.jit`, `jax.vmap` or a
+        derivative) and so has no values.
+    """
+    arguments = {name: value for name, value in arguments.items() if value is not None}
+    for name, value in arguments.items():
+        for label, leaf in _leaves(name, value):
+            if isinstance(leaf, Tracer):
+                raise ValueError(
+                    f"{label} is traced, so its values cannot be checked: call outside jax.jit, "
+                    "jax.vmap and derivatives, or with check_values=False."
+                )
+    surface = "albedo" in arguments and _is_surface(arguments["albedo"])
+    for name, value in arguments.items():
+        if name == "albedo" and surface:
+            for label, leaf in _leaves(name, value):
+                _check_range(label, np.asarray(leaf), _FINITE)
+        elif name == "moments":
+            moments = np.asarray(value)
+            _check_range(name, moments, _FINITE)
+            read = np.arange(moments.shape[-1]) > 0
+            _check_range(name, moments, RANGES[name], judged=read)
+        elif name == "mu0" and "solar_irradiance" in arguments:
+            mu0 = np.asarray(value)
+            _check_range(name, mu0, _FINITE)
+            lit = _reduced(np.not_equal(arguments["solar_irradiance"], 0), mu0.shape)
+            _check_range(name, mu0, RANGES[name], judged=lit)
+        else:
+            _check_range(name, np.asarray(value), RANGES[name])
+    if series_summed:
+        _check_series(*(np.asarray(arguments[name]) for name in ("tau", "ssa", "moments")))
+
+
+def _is_surface(albedo: Any) -> bool:
+    # A list of numbers is an array to the solver, although a pytree of many leaves to JAX.
+    if isinstance(albedo, list | tuple):
+        return False
+    return not jax.tree_util.all_leaves([albedo])
+
+
+def _leaves(name: str, value: Any) -> list[tuple[str, Any]]:
+    """Arrays and numbers in an argument, each with its name."""
+    return [
+        (name + jax.tree_util.keystr(path), leaf)
+        for path, leaf in jax.tree_util.tree_leaves_with_path(value)
+        if isinstance(leaf, jax.Array | np.ndarray | np.generic | int | float)
+    ]
+
+
+def _check_range(
+    name: str,
+    x: np.ndarray,
+    allowed: tuple[float, float, str],
+    judged: np.ndarray | bool = True,
+) -> None:
+    low, high, ends = allowed
+    above = x >= low if ends[0] == "[" else x > low
+    below = x <= high if ends[1] == "]" else x < high
+    bad = np.asarray(~(above & below) & judged)
+    if np.any(bad):
+        index, others = _first(bad)
+        interval = f"{ends[0]}{low:g}, {high:g}{ends[1]}"
+        raise ValueError(f"{name}{_subscript(index)} = {x[index]!s} is outside {interval}{others}.")
+
+
+def _check_series(tau: np.ndarray, ssa: np.ndarray, moments: np.ndarray) -> None:
+    degree = moments.shape[-1] - 1
+    last = np.asarray((2 * degree + 1) * np.abs(moments[..., -1]))
+    scatters = _reduced((tau != 0) & (ssa != 0), last.shape)
+    bad = np.asarray((last > LAST_TERM) & scatters)
+    if np.any(bad):
+        index, others = _first(bad)
+        layer = f"layer {index[-1]}" + (f" of column {index[:-1]}" if index[:-1] else "")
+        raise ValueError(
+            f"moments end too early to sum the phase function of {layer}: (2l + 1) |chi_l| = "
+            f"{last[index]:.3g} at the last l = {degree} is above {LAST_TERM:g}{others}; pass the "
+            "phase function itself as phase_function, from its closed form or a table "
+            "(interpolate_phase_function), or more moments (zeros where the series ends there)."
+        )
+
+
+def _reduced(mask: np.ndarray | np.bool, shape: tuple[int, ...]) -> np.ndarray:
+    """Whether `mask` is True for any of the elements that each element of `shape` meets."""
+    mask = np.broadcast_to(mask, np.broadcast_shapes(np.shape(mask), shape))
+    extra = mask.ndim - len(shape)
+    mask = np.asarray(np.any(mask, axis=tuple(range(extra))))
+    stretched = tuple(i for i, n in enumerate(shape) if n == 1 and mask.shape[i] != 1)
+    return np.asarray(np.any(mask, axis=stretched, keepdims=True))
+
+
+def _first(bad: np.ndarray) -> tuple[tuple[int, ...], str]:
+    """Index of the first offender, and how many more there are in words."""
+    index = tuple(int(i) for i in np.unravel_index(np.argmax(bad), bad.shape))
+    more = int(np.count_nonzero(bad)) - 1
+    return index, f" (and {more} more)" if more else ""
+
+
+def _subscript(index: tuple[int, ...]) -> str:
+    return f"[{', '.join(map(str, index))}]" if index else ""

@@ -1,0 +1,182 @@
+"""A column as the solver takes it: the arguments of its doors, promoted, checked and aligned."""
+
+import math
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from .doublings import sufficient_doublings, unknown_doublings
+from .surface import Lambertian, Surface
+
+
+class Column(NamedTuple):
+    """Arguments of `toa_brf` and `toa_radiance` by name, None where not given.
+
+    Outside, batch axes lead and broadcast; `OWN_AXES` tells the axes that belong to one column.
+    """
+
+    tau: jax.Array
+    ssa: jax.Array
+    moments: jax.Array
+    albedo: jax.Array | Surface
+    mu0: jax.Array
+    mu: jax.Array
+    relative_azimuth: jax.Array
+    phase_function: jax.Array | None = None
+    secant: jax.Array | None = None
+    planck_levels: jax.Array | None = None
+    surface_emission: jax.Array | None = None
+    isotropic_top: jax.Array | None = None
+    solar_irradiance: jax.Array | None = None
+
+
+OWN_AXES = {
+    "tau": ("layer",),
+    "ssa": ("layer",),
+    "moments": ("layer", "moment"),
+    "mu": ("view",),
+    "relative_azimuth": ("view",),
+    "phase_function": ("layer", "view"),
+    "secant": ("layer",),
+    "planck_levels": ("level",),
+}
+"""Axes of one column's arguments; those not named here are one number."""
+
+
+class Options(NamedTuple):
+    """What is static in a program of the solver."""
+
+    num_streams: int
+    num_modes: int
+    delta_m: bool
+    tms: bool
+    num_doublings: int
+
+
+def promoted(**arguments: Any) -> Column:
+    """Give all arguments their common floating type, before any JAX operation.
+
+    Python numbers have no type of their own and follow the arrays; integers become floating. A
+    Lambertian surface is its albedo, for which there is a closed form.
+    """
+    if isinstance(arguments["albedo"], Lambertian):
+        arguments["albedo"] = arguments["albedo"].albedo
+    leaves, structure = jax.tree.flatten(Column(**arguments))
+    arrays = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
+    types = [
+        leaf if isinstance(leaf, int | float) else array.dtype
+        for leaf, array in zip(leaves, arrays, strict=True)
+    ]
+    dtype = jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
+    return jax.tree.unflatten(structure, [x.astype(dtype) for x in arrays])
+
+
+def check_shapes(column: Column, num_moments: int, multiple_views: bool) -> None:
+    """Refuse arguments whose own axes are missing or disagree, or whose others do not broadcast."""
+    leading, sizes = [], {}
+    for name, leaf in _leaves(column):
+        axes = own_axes(name, multiple_views)
+        if leaf.ndim < len(axes):
+            needs = " and a ".join(f"{axis} axis" for axis in axes)
+            raise ValueError(f"{name} needs a {needs}; got shape {leaf.shape}.")
+        split = leaf.ndim - len(axes)
+        leading.append((name, leaf.shape[:split]))
+        for axis, size in zip(axes, leaf.shape[split:], strict=True):
+            sizes.setdefault(axis, []).append((name, size))
+    if "level" in sizes:
+        name, levels = sizes.pop("level")[0]
+        sizes["layer"].append((f"{name} less one level", levels - 1))
+    for axis in ("layer", "view"):
+        found = sizes.get(axis, [])
+        if len({size for _, size in found} - {1}) > 1:
+            raise ValueError(
+                f"arguments must have the same number of {axis}s; got "
+                + ", ".join(f"{size} in {name}" for name, size in found)
+                + "."
+            )
+    given = sizes["moment"][0][1]
+    if given < num_moments:
+        raise ValueError(
+            f"this many streams need at least {num_moments} moments a layer (num_streams + 1 with "
+            f"delta-M, num_streams without); got {given} in moments of shape "
+            f"{column.moments.shape}. Pad Rayleigh with zeros."
+        )
+    try:
+        np.broadcast_shapes(*(shape for _, shape in leading))
+    except ValueError:
+        listed = ", ".join(f"{shape} of {name}" for name, shape in leading)
+        raise ValueError(f"leading axes do not broadcast: {listed}.") from None
+
+
+def own_axes(name: str, multiple_views: bool) -> tuple[str, ...]:
+    """Axes of an argument that belong to one column, as they are outside."""
+    axes = OWN_AXES.get(name, ())
+    return axes if multiple_views else tuple(axis for axis in axes if axis != "view")
+
+
+def _leaves(column: Column) -> list[tuple[str, jax.Array]]:
+    """Arrays of a column with the argument's name; every array of a surface is an albedo."""
+    return [
+        (name, leaf) for name, value in column._asdict().items() for leaf in jax.tree.leaves(value)
+    ]
+
+
+def choose_doublings(column: Column, num_streams: int) -> int:
+    """Smallest sufficient number for concrete layers and beams, enough for any when traced."""
+    beams = [column.mu] + ([column.mu0] if column.secant is None else [1 / column.secant])
+    if any(isinstance(x, Tracer) for x in (column.tau, *beams)):
+        return unknown_doublings(num_streams)
+    if column.tau.size == 0:
+        return 0
+    min_mu = min(float(np.min(x)) for x in beams if x.size)
+    return sufficient_doublings(float(np.max(column.tau)), min_mu, num_streams)
+
+
+def aligned(column: Column, multiple_views: bool) -> tuple[Column, tuple[int, ...]]:
+    """Batch broadcast, flattened and moved last in every leaf; the batch's shape outside.
+
+    A single view gets its axis; an argument shared by layers or views gets one entry for each.
+    """
+    leaves = _leaves(column)
+    count = {name: len(own_axes(name, multiple_views)) for name, _ in leaves}
+    batch = jnp.broadcast_shapes(*(x.shape[: x.ndim - count[name]] for name, x in leaves))
+    num_layers = max(column.tau.shape[-1], column.ssa.shape[-1], column.moments.shape[-2])
+    num_views = 1
+    if multiple_views:
+        num_views = max(x.shape[-1] for x in (column.mu, column.relative_azimuth))
+
+    def inward(name: str, x: jax.Array) -> jax.Array:
+        own = list(x.shape[x.ndim - count[name] :])
+        axes = OWN_AXES.get(name, ())
+        if "view" in axes and not multiple_views:
+            x, own = x[..., None], [*own, 1]
+        sizes = {"layer": num_layers, "view": num_views}
+        own = [sizes.get(axis, size) for axis, size in zip(axes, own, strict=True)]
+        full = jnp.broadcast_to(x, (*batch, *own))
+        return jnp.moveaxis(full.reshape(math.prod(batch), *own), 0, -1)
+
+    fields = {
+        name: jax.tree.map(lambda leaf, name=name: inward(name, leaf), value)
+        for name, value in column._asdict().items()
+    }
+    return Column(**fields), batch
+
+
+def check_options(
+    num_streams: int,
+    num_modes: int | None,
+    single_scattering: str | None,
+    num_doublings: int | None,
+) -> None:
+    """Refuse options out of range."""
+    if num_streams < 2 or num_streams % 2:
+        raise ValueError(f"num_streams must be even and at least 2; got {num_streams}.")
+    if num_modes is not None and not 1 <= num_modes <= num_streams:
+        raise ValueError(f"num_modes must be 1 to num_streams = {num_streams}; got {num_modes}.")
+    if single_scattering not in ("tms", None):
+        raise ValueError(f"single_scattering must be 'tms' or None; got {single_scattering!r}.")
+    if num_doublings is not None and num_doublings < 0:
+        raise ValueError(f"num_doublings must be 0 or more; got {num_doublings}.")

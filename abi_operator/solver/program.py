@@ -1,0 +1,166 @@
+"""From a tile of columns to what leaves its top: the solver's parts put together."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .adding import Emission, Top, emitting_ground
+from .azimuth import (
+    Directions,
+    LegendreTables,
+    azimuthal_mean,
+    emitting_mean,
+    higher_modes,
+    legendre_tables,
+)
+from .bordered import Bordered, Vector
+from .column import Column, Options
+from .delta_m import ScaledLayers, unscaled
+from .delta_m import delta_m as scale_delta_m
+from .ground import black, isotropic, lambertian, reflecting
+from .legendre import legendre_series
+from .single_scatter import (
+    cos_scattering_angle,
+    direct_transmission,
+    exact_single_scattering,
+)
+from .surface import Surface
+
+
+class Emerging(NamedTuple):
+    """What leaves the top of each column towards each view.
+
+    `brf` is the answer to the sun alone; `emitted` the radiance from everything else, None where
+    nothing else shines.
+    """
+
+    brf: Float[Array, "view *batch"]
+    emitted: Float[Array, "view *batch"] | None
+
+
+class GroundResponse(NamedTuple):
+    """How columns over black ground see a Lambertian one; see `SurfaceCoupling`."""
+
+    brf_black: Float[Array, "view *batch"]
+    coupling: Float[Array, "view *batch"]
+    spherical_albedo: Float[Array, "*batch"]
+
+
+def emerging(column: Column, options: Options) -> Emerging:
+    """Solve columns whose batch is last (see `column.aligned`)."""
+    problem = _Problem(column, options)
+    mean, others = _grounds(column.albedo, problem)
+    shine = (column.planck_levels, column.surface_emission, column.isotropic_top)
+    if all(x is None for x in shine):
+        return Emerging(_brf(problem, problem.mean(mean), others), None)
+    zero = jnp.zeros_like(column.mu0)
+    planck, from_ground, from_above = (zero if x is None else x for x in shine)
+    jumps = None if column.planck_levels is None else planck[1:] - planck[:-1]
+    at_top, at_ground = (zero, zero) if jumps is None else (planck[0], planck[-1])
+    emission = emitting_ground(mean, problem.one, from_ground, at_ground)
+    top, emission = problem.emitting_mean(mean, emission, jumps)
+    emitted = top.emerging(emission, problem.one, from_above, at_top)[1:]
+    return Emerging(_brf(problem, top, others), emitted)
+
+
+def ground_response(column: Column, options: Options) -> GroundResponse:
+    r"""Solve columns over black ground, and what an isotropic ground would add.
+
+    The transmission T of isotropic ground light 1 towards each beam is, for the sun's beam and by
+    reciprocity, that of sunlight to the ground. Light reflected k times by the ground adds
+    :math:`T(\mu_0)T(\mu) a (Sa)^{k-1}`.
+    """
+    problem = _Problem(column, options)
+    ground = black(problem.directions.cosines, options.num_streams)
+    zero = jnp.zeros_like(column.mu0)
+    emission = emitting_ground(ground, problem.one, zero + 1, zero)
+    top, emission = problem.emitting_mean(ground, emission, None)
+    transmission = top.emerging(emission, problem.one, zero, zero)
+    return GroundResponse(
+        _brf(problem, top, None), transmission[0] * transmission[1:], top.spherical_albedo(emission)
+    )
+
+
+def plane_albedo(column: Column, options: Options) -> Float[Array, "*batch"]:
+    """Share of the sun's light that leaves the top in all directions."""
+    problem = _Problem(column, options)
+    mean, _ = _grounds(column.albedo, problem)
+    return problem.mean(mean).plane_albedo(problem.one)[0]
+
+
+class _Problem:
+    """What all modes share."""
+
+    def __init__(self, column: Column, options: Options):
+        num_streams = options.num_streams
+        moments = column.moments  # the zeroth is 1 and not read
+        moments = jnp.concatenate([jnp.ones_like(moments[:, :1]), moments[:, 1:]], axis=1)
+        scale = scale_delta_m if options.delta_m else unscaled
+        self.column, self.options, self.moments = column, options, moments
+        self.layers: ScaledLayers = scale(column.tau, column.ssa, moments, num_streams)
+        secant = 1 / column.mu0 if column.secant is None else column.secant
+        self.directions = Directions(
+            jnp.concatenate([column.mu0[None], column.mu]),
+            jnp.broadcast_to(secant, column.tau.shape),
+        )
+        self.one: Vector = isotropic(num_streams, self.directions.cosines)
+        self.tables = legendre_tables(num_streams, options.num_modes, self.directions.cosines)
+
+    def mean(self, ground: Bordered) -> Top:
+        return azimuthal_mean(*self._shared(), ground, **self._how())
+
+    def emitting_mean(
+        self,
+        ground: Bordered,
+        emission: Emission,
+        planck_jumps: Float[Array, "layer *batch"] | None,
+    ) -> tuple[Top, Emission]:
+        shared = self._shared()
+        return emitting_mean(*shared, ground, emission, self.one, planck_jumps, **self._how())
+
+    def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:
+        azimuth = self.column.relative_azimuth
+        return higher_modes(*self._shared(), grounds, azimuth, **self._how())
+
+    def _shared(self) -> tuple[ScaledLayers, LegendreTables, Directions]:
+        return self.layers, self.tables, self.directions
+
+    def _how(self) -> dict[str, Any]:
+        options = self.options
+        return {"num_doublings": options.num_doublings, "single_scattering": not options.tms}
+
+
+def _grounds(albedo: Array | Surface, problem: _Problem) -> tuple[Bordered, Bordered | None]:
+    """Ground in mode 0, and in the others (None where they do not see it)."""
+    cosines, num_streams = problem.directions.cosines, problem.options.num_streams
+    if not isinstance(albedo, Surface):
+        return lambertian(albedo, cosines, num_streams), None
+
+    # All modes at once: a reflectance is evaluated at its azimuths only once.
+    grounds = jax.vmap(lambda m: reflecting(albedo, m, cosines, num_streams))(
+        jnp.arange(problem.options.num_modes)
+    )
+    return jax.tree.map(lambda x: x[0], grounds), jax.tree.map(lambda x: x[1:], grounds)
+
+
+def _brf(problem: _Problem, mean: Top, grounds: Bordered | None) -> Float[Array, "view *batch"]:
+    """Sum of the modes, and of what is scattered or reflected once and added exactly."""
+    column, options, layers = problem.column, problem.options, problem.layers
+    mu0, mu, sun = column.mu0, column.mu, problem.directions.sun_secants
+    total = mean.reflection()
+    if options.num_modes > 1:
+        total = total + problem.higher(grounds)
+    brf = total / (2 * mu * mu0)
+    if isinstance(column.albedo, Surface):
+        reflected = column.albedo.brdf(mu, mu0[None], column.relative_azimuth)
+        brf = brf + reflected * direct_transmission(layers.tau, mu, sun)
+    if not options.tms:
+        return brf
+    exact = column.phase_function
+    if exact is None:
+        angle = cos_scattering_angle(mu0, mu, column.relative_azimuth)
+        exact = legendre_series(problem.moments, angle)
+    ratio = layers.scattering_ratio
+    return brf + exact_single_scattering(layers.tau, ratio, exact, mu0, mu, sun)

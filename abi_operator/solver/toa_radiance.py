@@ -1,0 +1,128 @@
+"""The solver's door for radiances: sunlight, thermal emission, or both in one solve."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from .._batching import map_tiles, tile_size
+from .column import Column, Options, aligned, promoted
+from .program import emerging
+from .surface import Surface
+from .toa_brf import outward, prepare
+
+# A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
+_LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5
+
+
+def toa_radiance(
+    tau: Float[ArrayLike, "*batch layer"],
+    ssa: Float[ArrayLike, "*batch layer"],
+    moments: Float[ArrayLike, "*batch layer moment"],
+    albedo: Float[ArrayLike, "*batch"] | Surface,
+    mu0: Float[ArrayLike, "*batch"],
+    mu: Float[ArrayLike, "*batch"],
+    relative_azimuth: Float[ArrayLike, "*batch"],
+    *,
+    solar_irradiance: Float[ArrayLike, "*batch"],
+    planck_levels: Float[ArrayLike, "*batch level"] | None = None,
+    surface_emission: Float[ArrayLike, "*batch"] | None = None,
+    isotropic_top: Float[ArrayLike, "*batch"] | float = 0.0,
+    num_streams: int = 16,
+    num_modes: int | None = None,
+    delta_m: bool = True,
+    single_scattering: str | None = "tms",
+    phase_function: Float[ArrayLike, "*batch layer"] | None = None,
+    secant: Float[ArrayLike, "*batch layer"] | None = None,
+    multiple_views: bool = False,
+    num_doublings: int | None = None,
+    check_values: bool = False,
+) -> Float[Array, "*batch"]:
+    r"""Radiance at the top of the atmosphere, in the units of its sources.
+
+    Sunlight and thermal emission are one solve. Differentiable like `toa_brf`, in the sources too.
+
+    Parameters
+    ----------
+    tau, ssa, moments, albedo, mu0, mu, relative_azimuth
+        As in `toa_brf`. Where `solar_irradiance` is 0 the sun may stand anywhere, below the horizon
+        too; the derivative in the irradiance is that of the sun's place for mu0 of 0.001 or more.
+    solar_irradiance
+        F0, on a plane across the beam. [radiance unit sr]
+    planck_levels
+        Planck function at the levels, one more than layers, top first; linear in tau between them.
+        None for air that does not emit. [radiance unit]
+    surface_emission
+        Radiance that leaves the ground isotropically, (1 - albedo) B for a warm Lambertian one.
+        None for 0. [radiance unit]
+    isotropic_top
+        Radiance that falls on the top from all directions alike. [radiance unit]
+    num_streams, num_modes, delta_m, single_scattering, phase_function, secant, multiple_views, \
+num_doublings, check_values
+        As in `toa_brf`.
+
+    Returns
+    -------
+    Radiance, in the arguments' common floating type. [radiance unit]
+
+    Raises
+    ------
+    ValueError
+        As `toa_brf`.
+    """
+    # Nothing falls on the top unless something is given: no program for it then.
+    dark = isinstance(isotropic_top, int | float) and isotropic_top == 0
+    given = promoted(
+        tau=tau,
+        ssa=ssa,
+        moments=moments,
+        albedo=albedo,
+        mu0=mu0,
+        mu=mu,
+        relative_azimuth=relative_azimuth,
+        phase_function=phase_function,
+        secant=secant,
+        planck_levels=planck_levels,
+        surface_emission=surface_emission,
+        isotropic_top=None if dark else isotropic_top,
+        solar_irradiance=solar_irradiance,
+    )
+    column = _with_harmless_sun(given)
+    options = prepare(
+        column,
+        checked=given,
+        num_streams=num_streams,
+        num_modes=num_modes,
+        delta_m=delta_m,
+        single_scattering=single_scattering,
+        multiple_views=multiple_views,
+        num_doublings=num_doublings,
+        check_values=check_values,
+    )
+    return _solve(column, options, multiple_views)
+
+
+def _with_harmless_sun(column: Column) -> Column:
+    """A place above the horizon for suns that do not shine."""
+    mu0, irradiance = column.mu0, column.solar_irradiance
+    assert irradiance is not None
+    # Arrays of NumPy stay so: the number of doublings is chosen from them.
+    xp = np if isinstance(mu0, np.ndarray) and isinstance(irradiance, np.ndarray) else jnp
+    away = (irradiance == 0) & (mu0 < _LOWEST_SUN)
+    return column._replace(mu0=xp.where(away, xp.asarray(_SOMEWHERE_ELSE, mu0.dtype), mu0))
+
+
+@partial(jax.jit, static_argnums=(1, 2))
+def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
+    columns, batch = aligned(column, multiple_views)
+
+    def radiance(tile: Column) -> Array:
+        brf, emitted = emerging(tile, options)
+        assert tile.solar_irradiance is not None
+        reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf
+        return reflected if emitted is None else reflected + emitted
+
+    result = map_tiles(radiance, columns, tile_size(options.num_streams))
+    return outward(result, batch, multiple_views)

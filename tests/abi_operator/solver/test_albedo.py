@@ -1,0 +1,105 @@
+"""Plane albedo, spherical albedo and the closed form in the ground's albedo."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from columns import simple_columns
+
+from abi_operator.solver import double_gauss, surface_coupling, toa_albedo, toa_brf
+
+OPTIONS = {"num_streams": 8, "num_doublings": 5}
+CLOSED_FORM = 1e-12  # the same solve, summed in another order
+
+
+@pytest.mark.parametrize("scattering", ["tms", None])
+def test_the_closed_form_is_the_solver_for_every_albedo(scattering):
+    tau, ssa, moments, albedo, *angles = simple_columns()
+    options = OPTIONS | {"single_scattering": scattering}
+    coupling = surface_coupling(tau, ssa, moments, *angles, **options)
+    for a in (0.0, 0.3, 1.0, albedo):
+        expected = toa_brf(tau, ssa, moments, a, *angles, **options)
+        np.testing.assert_allclose(coupling.brf(a), expected, rtol=CLOSED_FORM)
+    np.testing.assert_allclose(coupling.albedo(expected), albedo, rtol=1e-11)
+
+
+def test_the_closed_form_for_several_views_and_under_a_slanting_sun():
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    views = np.stack([mu, mu0], axis=1), np.stack([azimuth, 0 * azimuth], axis=1)
+    secant = 0.9 / mu0[:, None] * np.ones_like(tau)
+    options = OPTIONS | {"multiple_views": True, "secant": secant}
+    coupling = surface_coupling(tau, ssa, moments, mu0, *views, **options)
+    expected = toa_brf(tau, ssa, moments, albedo, mu0, *views, **options)
+    np.testing.assert_allclose(coupling.brf(albedo), expected, rtol=CLOSED_FORM)
+    np.testing.assert_allclose(
+        coupling.albedo(expected), np.stack([albedo, albedo], axis=1), rtol=1e-11
+    )
+
+
+def test_plane_albedo_is_the_mean_reflectance():
+    r""":math:`2\sum_i w_i\mu_i BRF_0(\mu_i)` over the streams, mode 0, without the correction."""
+    tau, ssa, moments, albedo, mu0, *_ = simple_columns()
+    mu, weight = double_gauss(8)
+    views = np.broadcast_to(mu, (4, 4))
+    mean = toa_brf(
+        tau, ssa, moments, albedo, mu0, views, 0 * views, num_modes=1, single_scattering=None,
+        multiple_views=True, **OPTIONS,
+    )  # fmt: skip
+    plane = toa_albedo(tau, ssa, moments, albedo, mu0, **OPTIONS)
+    np.testing.assert_allclose(plane, 2 * np.sum(weight * mu * mean, axis=1), rtol=CLOSED_FORM)
+
+
+def test_nothing_is_lost_in_white_air_over_white_ground():
+    """1 to 1e-12 for layers up to 200, to 1e-10 up to 1e5: the co-albedo keeps its place."""
+    tau, ssa, moments, _, mu0, *_ = simple_columns(count=50, num_layers=8)
+    rng = np.random.default_rng(2)
+    white = np.ones_like(ssa)
+    up_to_200 = 10 ** rng.uniform(-4, np.log10(200), tau.shape)
+    up_to_200[:, 3] = 200
+    for num_streams in (2, 8, 16):
+        plane = toa_albedo(up_to_200, white, moments, 1.0, mu0, num_streams=num_streams)
+        np.testing.assert_allclose(plane, 1, rtol=1e-12)
+    thicker = up_to_200.copy()
+    thicker[:, 5] = 1e5
+    plane = toa_albedo(thicker, white, moments, 1.0, mu0, num_streams=8)
+    np.testing.assert_allclose(plane, 1, rtol=1e-10)
+
+
+def test_conservative_air_sends_light_up_or_down():
+    """With ssa = 1 the spherical albedo from below and the mean transmission add up to 1."""
+    tau, ssa, moments, _, mu0, mu, azimuth = simple_columns()
+    white = np.ones_like(ssa)
+    nodes, weight = double_gauss(8)
+    shape = (4, nodes.size)
+    views = np.broadcast_to(nodes, shape)
+    coupling = surface_coupling(
+        tau, white, moments, mu0, views, np.zeros(shape), multiple_views=True, **OPTIONS
+    )
+    plane = toa_albedo(tau, white, moments, 0.0, mu0, **OPTIONS)
+    # coupling = T(mu0) T(mu); black ground swallows T(mu0) of the sunlight.
+    upward = 2 * np.sum(weight * nodes * coupling.coupling, axis=1) / (1 - plane)
+    np.testing.assert_allclose(upward, 1 - coupling.spherical_albedo, rtol=1e-11)
+
+
+def test_derivatives_of_the_closed_form():
+    tau, ssa, moments, albedo, *angles = (jnp.asarray(x) for x in simple_columns())
+
+    def by_coupling(tau, albedo):
+        return jnp.sum(surface_coupling(tau, ssa, moments, *angles, **OPTIONS).brf(albedo))
+
+    def directly(tau, albedo):
+        return jnp.sum(toa_brf(tau, ssa, moments, albedo, *angles, **OPTIONS))
+
+    for found, expected in zip(
+        jax.grad(by_coupling, argnums=(0, 1))(tau, albedo),
+        jax.grad(directly, argnums=(0, 1))(tau, albedo),
+        strict=True,
+    ):
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-13)
+    slope = jax.grad(lambda t: jnp.sum(toa_albedo(t, ssa, moments, albedo, angles[0], **OPTIONS)))
+    step = np.zeros_like(tau)
+    step[:, 1] = 1e-5
+    difference = [
+        toa_albedo(tau + s * step, ssa, moments, albedo, angles[0], **OPTIONS) for s in (1, -1)
+    ]
+    np.testing.assert_allclose(slope(tau)[:, 1], (difference[0] - difference[1]) / 2e-5, rtol=1e-6)

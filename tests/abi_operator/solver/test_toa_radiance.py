@@ -1,0 +1,163 @@
+"""Radiances: sunlight, emission and both, in closed forms and invariances."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from columns import simple_columns
+
+from abi_operator.solver import toa_brf, toa_radiance
+
+OPTIONS = {"num_streams": 8, "num_doublings": 5}
+# The start of a layer errs by 1e-12, and rounding adds up over five layers.
+SOLVED = 1e-11
+
+
+def warm(num_levels=6, count=4, seed=8):
+    """Planck levels, ground emission and light from above, nothing isothermal."""
+    rng = np.random.default_rng(seed)
+    return {
+        "planck_levels": rng.uniform(1, 9, (count, num_levels)),
+        "surface_emission": rng.uniform(1, 9, count),
+        "isotropic_top": rng.uniform(0, 2, count),
+    }
+
+
+def test_sun_of_irradiance_pi_over_mu0_is_the_brf():
+    columns = simple_columns()
+    radiance = toa_radiance(*columns, solar_irradiance=np.pi, **OPTIONS)
+    np.testing.assert_allclose(radiance / columns[4], toa_brf(*columns, **OPTIONS), rtol=1e-14)
+
+
+def test_sun_and_emission_add():
+    columns, sources = simple_columns(), warm()
+    both = toa_radiance(*columns, solar_irradiance=5.0, **sources, **OPTIONS)
+    sun = toa_radiance(*columns, solar_irradiance=5.0, **OPTIONS)
+    night = toa_radiance(*columns, solar_irradiance=0.0, **sources, **OPTIONS)
+    np.testing.assert_allclose(both, sun + night, rtol=1e-13)
+    parts = [
+        toa_radiance(*columns, solar_irradiance=0.0, **{name: x}, **OPTIONS)
+        for name, x in sources.items()
+    ]
+    np.testing.assert_allclose(sum(parts), night, rtol=1e-12)
+
+
+def test_absorbing_air_follows_schwarzschild():
+    r"""Without scattering, over black ground: each layer in closed form, :math:`e^{-\tau/\mu}`."""
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    sources = warm()
+    result = toa_radiance(
+        tau, 0 * ssa, moments, 0 * albedo, mu0, mu, azimuth,
+        solar_irradiance=0.0, **sources, num_streams=8,
+    )  # fmt: skip
+    planck, below = sources["planck_levels"], sources["surface_emission"]
+    for i in reversed(range(tau.shape[1])):
+        t = tau[:, i] / mu
+        top, bottom = planck[:, i], planck[:, i + 1]
+        # integral of (top + (bottom - top) x / t) exp(-x), x from 0 to t
+        own = top - bottom * np.exp(-t) + (bottom - top) * -np.expm1(-t) / t
+        below = below * np.exp(-t) + own
+    np.testing.assert_allclose(result, below, rtol=SOLVED)
+
+
+@pytest.mark.parametrize("albedo", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("ssa", [0.0, 0.7, 1.0])
+def test_isothermal_black_body(ssa, albedo):
+    tau, _, moments, _, *angles = simple_columns()
+    result = toa_radiance(
+        tau, np.full(tau.shape, ssa), moments, albedo, *angles, solar_irradiance=0.0,
+        planck_levels=np.full((4, 6), 7.0), surface_emission=7 * (1 - albedo), isotropic_top=7.0,
+        **OPTIONS,
+    )  # fmt: skip
+    np.testing.assert_allclose(result, 7, rtol=1e-14)
+
+
+def test_splitting_a_layer_where_the_planck_function_is_linear():
+    tau, ssa, moments, *rest = simple_columns()
+    sources = warm()
+    whole = toa_radiance(tau, ssa, moments, *rest, solar_irradiance=1.0, **sources, **OPTIONS)
+    levels = sources["planck_levels"]
+    finer = np.empty((4, 11))
+    finer[:, 0::2], finer[:, 1::2] = levels, 0.5 * (levels[:, 1:] + levels[:, :-1])
+    halves = [np.repeat(x, 2, axis=1) for x in (0.5 * tau, ssa, moments)]
+    split = toa_radiance(
+        *halves, *rest, solar_irradiance=1.0, **(sources | {"planck_levels": finer}), **OPTIONS
+    )
+    np.testing.assert_allclose(split, whole, rtol=1e-10)
+
+
+def test_empty_layers_do_not_emit():
+    tau, ssa, moments, *rest = simple_columns()
+    sources = warm()
+    whole = toa_radiance(tau, ssa, moments, *rest, solar_irradiance=1.0, **sources, **OPTIONS)
+    empty = [np.insert(x, 2, 0.0, axis=1) for x in (tau, ssa, moments)]
+    level = sources["planck_levels"]
+    # An empty layer lies between the level's value and another from which the next layer starts:
+    # continuous levels make that the same value.
+    levels = np.insert(level, 2, level[:, 2], axis=1)
+    result = toa_radiance(
+        *empty, *rest, solar_irradiance=1.0, **(sources | {"planck_levels": levels}), **OPTIONS
+    )
+    np.testing.assert_allclose(result, whole, rtol=1e-13)
+
+
+def test_at_night_the_sun_may_stand_anywhere():
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns(num_moments=65)
+    sources = warm()
+
+    def night(cosine, **options):
+        return toa_radiance(
+            tau, ssa, moments, albedo, cosine, mu, azimuth, solar_irradiance=0.0, **sources,
+            num_streams=8, **options,
+        )  # fmt: skip
+
+    day = night(mu0, num_doublings=9)
+    for cosine in (-mu0, 0 * mu0, 1e-300 + 0 * mu0):
+        result = night(cosine, num_doublings=9)
+        np.testing.assert_allclose(result, day, rtol=1e-13)
+        slopes = jax.grad(lambda c, k: jnp.sum(night(c, num_doublings=3)), argnums=0)(
+            jnp.asarray(cosine), 0
+        )
+        np.testing.assert_array_equal(slopes, 0)
+    np.testing.assert_allclose(night(-mu0, check_values=True), day, rtol=1e-10)
+
+
+def test_derivatives_in_the_sources_are_the_linear_parts():
+    columns = [jnp.asarray(x) for x in simple_columns()]
+    sources = {name: jnp.asarray(x) for name, x in warm().items()}
+    sources["solar_irradiance"] = jnp.full(4, 2.0)
+
+    def radiance(sources):
+        return toa_radiance(*columns, **sources, **OPTIONS)
+
+    value, slope = jax.jvp(radiance, (sources,), (sources,))
+    np.testing.assert_allclose(slope, value, rtol=1e-13)  # homogeneous of degree one
+    back = jax.grad(lambda s: jnp.sum(radiance(s)))(sources)
+    total = sum(jnp.sum(back[name] * x) for name, x in sources.items())
+    np.testing.assert_allclose(total, jnp.sum(value), rtol=1e-12)
+
+
+def test_several_views_in_one_solve():
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    sources = warm()
+    views = np.stack([mu, mu0, np.full(4, 0.9)], axis=1)
+    turned = np.stack([azimuth, 0 * azimuth, np.full(4, 2.5)], axis=1)
+    together = toa_radiance(
+        tau, ssa, moments, albedo, mu0, views, turned, solar_irradiance=1.0, **sources,
+        multiple_views=True, **OPTIONS,
+    )  # fmt: skip
+    assert together.shape == (4, 3)
+    for i in range(3):
+        alone = toa_radiance(
+            tau, ssa, moments, albedo, mu0, views[:, i], turned[:, i], solar_irradiance=1.0,
+            **sources, **OPTIONS,
+        )  # fmt: skip
+        np.testing.assert_allclose(together[:, i], alone, rtol=1e-13)
+
+
+def test_shapes_of_the_sources_are_checked():
+    columns = simple_columns()
+    with pytest.raises(ValueError, match="same number of layers.*4 in planck_levels less one"):
+        toa_radiance(*columns, solar_irradiance=1.0, planck_levels=np.ones((4, 5)))
+    with pytest.raises(ValueError, match=r"do not broadcast.*\(3,\) of surface_emission"):
+        toa_radiance(*columns, solar_irradiance=1.0, surface_emission=np.ones(3))

@@ -1,0 +1,238 @@
+"""Every published case in one call of the solver a number of streams: compiling is what costs."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from disort_suite import (
+    FULL_DEGREE,
+    Problem,
+    cdisort_planck,
+    phase_moments,
+    random_emitting_problems,
+    read_table,
+    suite_problem,
+)
+
+from abi_operator.solver import toa_albedo, toa_radiance
+
+MAX_LAYERS = 6
+H_OMEGA = (0.2, 0.5, 0.9, 0.99, 0.999, 1.0)
+H_MU = (0.1, 0.4, 0.7, 1.0)
+# exp(-2 k tau) < 1e-10 for each diffusion exponent k; omega = 1 has its rest in closed form.
+H_TAU = (40.0, 40.0, 40.0, 80.0, 250.0, 40.0)
+MEAN_AZIMUTHS = (18.0, 54.0, 90.0, 126.0, 162.0)
+SEED = 19850314
+NUM_RANDOM, RANDOM_STREAMS = 100, (4, 8, 16)
+
+
+@dataclass(frozen=True)
+class View:
+    """A problem seen from one direction; azimuth as DISORT counts it. [deg]"""
+
+    problem: Problem
+    mu: float
+    azimuth_deg: float = 0.0
+    planck_levels: np.ndarray | None = None
+    surface_emission: float = 0.0
+
+    def sources(self):
+        """Planck function at the levels, emission of the ground, and what falls on the top."""
+        p = self.problem
+        if p.temperature is None:
+            levels = self.planck_levels
+            levels = np.zeros(p.tau.size + 1) if levels is None else levels
+            return levels, self.surface_emission, p.isotropic_top
+        levels = np.array([cdisort_planck(t, p.wavenumber) for t in p.temperature])
+        ground = (1 - p.albedo) * cdisort_planck(p.bottom_temperature, p.wavenumber)
+        return levels, ground, p.isotropic_top + cdisort_planck(p.top_temperature, p.wavenumber)
+
+
+def half_range_nodes(num_streams):
+    """Nodes and weights of Gauss on 0 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(num_streams // 2)
+    return (nodes + 1) / 2, weights / 2
+
+
+def solver_arguments(views, max_layers=MAX_LAYERS):
+    """Arguments of `toa_radiance`, batch first; empty layers below fill up `max_layers`."""
+    problems = [view.problem for view in views]
+    num_moments = max(p.moments.shape[1] for p in problems)
+    tau, ssa = np.zeros((2, len(views), max_layers))
+    moments = np.zeros((len(views), max_layers, num_moments))
+    moments[..., 0] = 1
+    levels = np.zeros((len(views), max_layers + 1))
+    ground, top = np.zeros((2, len(views)))
+    for i, (view, p) in enumerate(zip(views, problems, strict=True)):
+        n = p.tau.size
+        tau[i, :n], ssa[i, :n], moments[i, :n, : p.moments.shape[1]] = p.tau, p.ssa, p.moments
+        inside, ground[i], top[i] = view.sources()
+        levels[i, : n + 1], levels[i, n + 1 :] = inside, inside[-1]
+    albedo, mu0, irradiance = (
+        np.array([getattr(p, key) for p in problems])
+        for key in ("albedo", "mu0", "solar_irradiance")
+    )
+    mu = np.array([view.mu for view in views])
+    azimuth = np.pi - np.radians([view.azimuth_deg for view in views])
+    sources = {
+        "solar_irradiance": irradiance,
+        "planck_levels": levels,
+        "surface_emission": ground,
+        "isotropic_top": top,
+    }
+    return (tau, ssa, moments, albedo, mu0, mu, azimuth), sources
+
+
+@cache
+def problems(degree=None):
+    """The suite's problems by name; moments up to `degree`, or as the suite has them."""
+    return {row["case"]: suite_problem(row, degree) for row in read_table("disort_problems.csv")}
+
+
+@cache
+def streams():
+    """The suite's number of streams by problem."""
+    return {row["case"]: int(row["streams"]) for row in read_table("disort_problems.csv")}
+
+
+def suite_rows(table, num_streams=None):
+    """Rows of a table of the suite, all or those for so many streams."""
+    return [r for r in read_table(table) if num_streams in (None, streams()[r["case"]])]
+
+
+def glows(problem):
+    """Whether anything but the sun shines."""
+    return problem.isotropic_top > 0 or problem.temperature is not None
+
+
+def _views(num_streams):
+    def suite(row, degree=None):
+        return View(problems(degree)[row["case"]], float(row["mu"]), float(row["azimuth_deg"]))
+
+    # The flux without the sun: radiances at the nodes. TMS does nothing there.
+    dark = [
+        View(replace(problems()[row["case"]], solar_irradiance=0.0), mu)
+        for row in suite_rows("disort_fluxes.csv", num_streams)
+        if glows(problems()[row["case"]])
+        for mu in half_range_nodes(num_streams)[0]
+    ]
+    views = {
+        "suite": [suite(r) for r in suite_rows("disort_radiances.csv", num_streams)],
+        "dark": dark,
+    }
+    if num_streams in RANDOM_STREAMS:
+        views["random"] = random_views(num_streams)
+    if num_streams in (16, 32, 64):
+        views |= {
+            "converged": [suite(r, FULL_DEGREE) for r in suite_rows("disort_radiances.csv")],
+            "garcia_siewert": _garcia_siewert(),
+            "van_de_hulst": [
+                View(_van_de_hulst(r), float(r["mu"]))
+                for r in read_table("van_de_hulst.csv")
+                if r["mu"] != "flux"
+            ],
+            "semi_infinite": [View(p, mu) for p in semi_infinite() for mu in H_MU],
+            "emitting": _emitting(),
+        }
+    if num_streams == 16:
+        views["isothermal"] = _isothermal()
+    return views
+
+
+@cache
+def random_views(num_streams):
+    """Random warm columns, the odd ones in sunlight too; other ones for each number of streams."""
+    rng = np.random.default_rng([SEED, num_streams])
+    return [View(*one) for one in random_emitting_problems(rng, NUM_RANDOM, MAX_LAYERS)]
+
+
+def _garcia_siewert():
+    views = []
+    for row in read_table("garcia_siewert.csv"):
+        ssa = 0.95 if row["problem"] == "mie_8" else 0.9
+        phase = phase_moments(row["problem"], 1, FULL_DEGREE)
+        slab = Problem(np.ones(1), np.array([ssa]), phase, mu0=0.5, solar_irradiance=np.pi)
+        # The zeros of cos 5 phi: the mean over them is exact for modes 0 to 9.
+        mean = row["azimuth_deg"] == "mean"
+        azimuths = MEAN_AZIMUTHS if mean else [float(row["azimuth_deg"])]
+        views += [View(slab, float(row["mu"]), azimuth) for azimuth in azimuths]
+    return views
+
+
+def _van_de_hulst(row):
+    tau, ssa, g = (np.array([float(row[key])]) for key in ("tau", "ssa", "asymmetry"))
+    phase = g[:, None] ** np.arange(FULL_DEGREE + 1)
+    return Problem(tau, ssa, phase, mu0=float(row["mu0"]), solar_irradiance=np.pi)
+
+
+def semi_infinite():
+    """Thick isotropic layers under each sun, omega slowest."""
+    phase = phase_moments("isotropic", 1, FULL_DEGREE)
+    return [
+        Problem(np.array([tau]), np.array([omega]), phase, mu0=mu0, solar_irradiance=np.pi / mu0)
+        for omega, tau in zip(H_OMEGA, H_TAU, strict=True)
+        for mu0 in H_MU
+    ]
+
+
+def _emitting():
+    # B = 1 + 0.3 tau over a black ground at the temperature of the last level.
+    phase = phase_moments("isotropic", 1, FULL_DEGREE)
+    return [
+        View(
+            Problem(np.array([tau]), np.array([omega]), phase),
+            mu,
+            planck_levels=1 + 0.3 * np.array([0, tau]),
+            surface_emission=1 + 0.3 * tau,
+        )
+        for omega, tau in zip(H_OMEGA[:-1], H_TAU[:-1], strict=True)
+        for mu in H_MU
+    ]
+
+
+def _isothermal(count=60, planck=1.7):
+    rng = np.random.default_rng(SEED)
+    views = []
+    for i in range(count):
+        layers = rng.integers(1, MAX_LAYERS + 1)
+        tau = 10 ** rng.uniform(-4, 2, layers) * (rng.random(layers) > 0.1)
+        ssa = rng.choice([0.0, 1.0, rng.uniform(), 1 - 1e-6], layers)
+        phase = rng.uniform(-0.5, 0.95, (layers, 1)) ** np.arange(FULL_DEGREE + 1)
+        albedo = (0.0, 1.0, rng.uniform())[i % 3]
+        box = Problem(tau, ssa, phase, albedo, isotropic_top=planck)
+        level = np.full(layers + 1, planck)
+        views.append(View(box, rng.uniform(0.02, 1), 0.0, level, (1 - albedo) * planck))
+    return views
+
+
+@cache
+def radiances(num_streams):
+    """Radiance of every view at so many streams, by group."""
+    views = _views(num_streams)
+    arguments, sources = solver_arguments([view for group in views.values() for view in group])
+    result = np.asarray(toa_radiance(*arguments, **sources, num_streams=num_streams))
+    ends = np.cumsum([len(group) for group in views.values()])
+    return dict(zip(views, np.split(result, ends[:-1]), strict=True))
+
+
+@cache
+def plane_albedos(num_streams):
+    """Plane albedo at so many streams, by group: the suite's own, converged, thick, tabulated."""
+    groups = {
+        "suite": [problems()[r["case"]] for r in suite_rows("disort_fluxes.csv", num_streams)]
+    }
+    if num_streams in (16, 32, 64):
+        groups |= {
+            "converged": [
+                problems(FULL_DEGREE)[r["case"]] for r in suite_rows("disort_fluxes.csv")
+            ],
+            "van_de_hulst": [
+                _van_de_hulst(r) for r in read_table("van_de_hulst.csv") if r["mu"] == "flux"
+            ],
+            "semi_infinite": semi_infinite(),
+        }
+    views = [View(p, 0.5) for group in groups.values() for p in group]
+    (tau, ssa, moments, albedo, mu0, *_), _ = solver_arguments(views)
+    result = np.asarray(toa_albedo(tau, ssa, moments, albedo, mu0, num_streams=num_streams))
+    ends = np.cumsum([len(group) for group in groups.values()])
+    return dict(zip(groups, np.split(result, ends[:-1]), strict=True))
