@@ -1,4 +1,4 @@
-"""The sun's path on a sphere: limits, geometry with 50 digits, what one ray for all levels costs."""
+"""The sun's path on a sphere: limits, geometry with 50 digits, the cost of one ray for all."""
 
 from decimal import Decimal, localcontext
 
