@@ -3,19 +3,32 @@
 import re
 from pathlib import Path
 
+import numpy as np
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-def test_python_blocks_run():
+def run_block(number):
     blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
-    assert blocks
-    for block in blocks:
-        names = {}
-        exec(compile(block, "README.md", "exec"), names)
-        slope = names["K"].atmosphere.plumes["smoke"].ssa["C01"]
-        assert slope.shape == names["rho"].shape == (4,)
-        assert slope[0] > 0 and (slope[1:] == 0).all()
+    assert len(blocks) == 2
+    names = {}
+    exec(compile(blocks[number], "README.md", "exec"), names)
+    return names
+
+
+def test_the_operators_block_runs():
+    names = run_block(0)
+    slope = names["K"].atmosphere.plumes["smoke"].ssa["C01"]
+    assert slope.shape == names["rho"].shape == (4,)
+    assert slope[0] > 0 and (slope[1:] == 0).all()
+
+
+def test_the_solvers_block_runs():
+    names = run_block(1)
+    # Two solves of the same columns, in one of which the ground is a closed form.
+    np.testing.assert_allclose(names["response"].brf(0.1), names["brf"], rtol=1e-12)
+    assert 0.4 < names["share"] < 0.7 and names["warm"] > 0
 
 
 def test_the_test_line_is_the_one_of_the_full_check():
