@@ -53,4 +53,6 @@ def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
     def joined(x: Array) -> Array:
         return jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], count * tile)[..., :size]
 
-    return jax.tree.map(joined, jax.lax.map(function, jax.tree.map(tiled, columns)))
+    # Reverse mode computes a tile again when its turn comes, so that its memory is that of a tile.
+    mapped = jax.lax.map(jax.checkpoint(function), jax.tree.map(tiled, columns))
+    return jax.tree.map(joined, mapped)

@@ -1,6 +1,7 @@
 """The azimuth modes of the multiple scattering, one stack each."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -102,7 +103,7 @@ def azimuthal_mean(
         _, admittance, impedance = half(layer)
         return add_layer(stack, admittance, impedance, layer[0]), None
 
-    stack, _ = jax.lax.scan(add, ground, _properties_of_the_mean(layers, directions), reverse=True)
+    stack, _ = _scan_upwards(add, ground, _properties_of_the_mean(layers, directions))
     return top(stack)
 
 
@@ -138,8 +139,17 @@ def emitting_mean(
         return add_emitting_layer(stack, emission, admittance, impedance, layer[0], jump), None
 
     xs = (_properties_of_the_mean(layers, directions), planck_jumps)
-    (stack, emission), _ = jax.lax.scan(add, (ground, emission), xs, reverse=True)
+    (stack, emission), _ = _scan_upwards(add, (ground, emission), xs)
     return top(stack), emission
+
+
+def _scan_upwards(add: Callable, stack: Any, layers: Any) -> tuple[Any, Any]:
+    """Add the layers from the ground up.
+
+    Reverse mode keeps the stack between layers and computes each layer again: a quarter of the
+    time of writing down all that happens in it, and a fraction of the memory.
+    """
+    return jax.lax.scan(jax.checkpoint(add), stack, layers, reverse=True)
 
 
 def _properties_of_the_mean(layers: ScaledLayers, directions: Directions) -> tuple[Array, ...]:
@@ -204,7 +214,7 @@ def higher_modes(
             return add_layer(stack, admittance, impedance, tau), None
 
         xs = (layers.tau, directions.sun_secants, moments[m % 2], moments[1 - m % 2])
-        stack, _ = jax.lax.scan(add, ground, xs, reverse=True)
+        stack, _ = _scan_upwards(add, ground, xs)
         sign = jnp.where(m % 2 == 0, 2, -2).astype(dtype)
         angle = m.astype(dtype) * relative_azimuth
         return total + sign * jnp.cos(angle) * top(stack).reflection(), None

@@ -6,6 +6,7 @@ import pytest
 from columns import simple_columns
 from forty_digits import Ground, forty_digit_brf, forty_digit_radiance
 from jaxtyping import Array, Float
+from surfaces import Constant
 
 from abi_operator.solver import (
     Lambertian,
@@ -86,16 +87,6 @@ class Vegetation(Surface):
             return float(np.mean(brdf(mu_out, mu_in, azimuth) * np.cos(m * azimuth)))
 
         return Ground(brdf, mode)
-
-
-class Constant(Surface):
-    """Lambertian, but unknown to the solver as such."""
-
-    level: Float[Array, "*batch"]
-
-    def brdf(self, mu_out, mu_in, relative_azimuth):
-        shape = jnp.broadcast_shapes(mu_out.shape, mu_in.shape, relative_azimuth.shape)
-        return jnp.broadcast_to(self.level, shape)
 
 
 TILTED = Tilted(jnp.array([0.3, 0.1, 0.5]), jnp.array([0.2, 0.1, -0.3]))

@@ -8,8 +8,9 @@ import pytest
 from abi_operator._batching import map_tiles
 from abi_operator._numerics import inverse, matmul, safe_divide, safe_sqrt
 from abi_operator.solver import double_gauss, sufficient_doublings
-from abi_operator.solver.bordered import Bordered, between
-from abi_operator.solver.doublings import _REACH
+from abi_operator.solver.bordered import Bordered, Vector, between, between_and_quotient
+from abi_operator.solver.delta_m import delta_m
+from abi_operator.solver.doublings import _REACH, unknown_doublings
 from abi_operator.solver.layer import half_layer
 from abi_operator.solver.legendre import associated_legendre, legendre_series
 
@@ -42,6 +43,47 @@ def test_legendre_series_sums_henyey_greenstein():
     total = legendre_series(jnp.asarray(g ** np.arange(80.0))[None], jnp.asarray([cosine]))
     expected = (1 - g**2) / (1 + g**2 - 2 * g * cosine) ** 1.5
     np.testing.assert_allclose(total[0, 0], expected, rtol=1e-13)
+
+
+def test_delta_m_leaves_absorption_and_mean_forward_scattering_alone():
+    """tau (1 - omega) and tau (1 - omega g), and the co-albedo below rounding of 1 - omega."""
+    rng = np.random.default_rng(4)
+    tau, ssa = jnp.asarray(rng.uniform(0, 9, (3, 5))), jnp.asarray(rng.uniform(0, 1, (3, 5)))
+    ssa = ssa.at[0].set(1 - 1e-15)
+    g = jnp.asarray(rng.uniform(-0.5, 0.95, (3, 5)))
+    moments = g[:, None] ** jnp.arange(9.0)[None, :, None]
+    scaled = delta_m(tau, ssa, moments, 8)
+    np.testing.assert_allclose(scaled.tau * scaled.coalbedo, tau * (1 - ssa), rtol=1e-14)
+    np.testing.assert_allclose(
+        scaled.tau * (1 - scaled.ssa * scaled.moments[:, 1]), tau * (1 - ssa * g), rtol=1e-13
+    )
+    np.testing.assert_allclose(scaled.ssa, 1 - scaled.coalbedo, rtol=1e-13)
+
+
+def test_bordered_matrices_act_on_light_without_a_sun():
+    rng = np.random.default_rng(2)
+    a, b = random_bordered(rng), random_bordered(rng)
+    vector = Vector(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=2)))
+    # With the sun as a view, which its symmetric kind allows, the matrix is this one.
+    plain = np.append(vector.nodes, vector.beams)
+    np.testing.assert_allclose(np.append(*leaves(a @ vector)), as_views(a) @ plain, rtol=1e-12)
+    _, quotient = between_and_quotient(a, b, a)
+    expected = as_views(a) @ np.linalg.inv(as_views(b)) @ plain
+    found = np.append(*leaves(quotient.transposed_action(vector)))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def leaves(vector):
+    return vector.nodes, vector.beams
+
+
+def as_views(matrix):
+    """The matrix over (nodes, beams) with every beam fed by the nodes and feeding nothing."""
+    n = matrix.core.shape[0]
+    full = np.zeros((n + 2, n + 2))
+    full[:n, :n], full[n:, :n] = matrix.core, matrix.border.T
+    full[[n, n + 1], [n, n + 1]] = matrix.diagonal
+    return full
 
 
 def random_bordered(rng, nodes=3, batch=()):
@@ -125,6 +167,9 @@ def test_more_doublings_for_thicker_layers_and_lower_sun():
     assert sufficient_doublings(1e5, 1e-3, 8) <= 13
     steps = [sufficient_doublings(t, 0.3, 8) for t in (0.01, 1, 30, 1e3, 1e6)]
     assert steps == sorted(steps)
+    for num_streams in (2, 16, 128):  # at 128 streams the smallest cosine is below 1e-3
+        assert unknown_doublings(num_streams) >= sufficient_doublings(1e5, 1e-3, num_streams)
+        assert sufficient_doublings(1e5, 1e-3, num_streams) <= 14
 
 
 @pytest.mark.parametrize("doublings", range(7))

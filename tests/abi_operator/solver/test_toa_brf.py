@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from cdisort import cdisort_brf
 from columns import simple_columns
 
 from abi_operator.solver import toa_brf
@@ -101,6 +102,32 @@ def test_doublings_chosen_from_the_data_equal_more_of_them():
     np.testing.assert_allclose(chosen, brf(columns, num_doublings=9), rtol=1e-10)
     traced = jax.jit(lambda *a: toa_brf(*a, num_streams=8))(*columns)
     np.testing.assert_allclose(chosen, traced, rtol=1e-10)
+
+
+def test_thick_neighbours_change_nothing_through_the_doublings():
+    columns = simple_columns()
+    alone = brf([x[:1] for x in columns], num_doublings=None)
+    columns[0][1:] = 1e4
+    np.testing.assert_allclose(brf(columns, num_doublings=None)[:1], alone, rtol=SPLIT)
+
+
+def test_grazing_reflectances_below_zero_are_reported():
+    """Four streams, no correction, sun and view 87 degrees from the vertical: -0.6, as CDISORT."""
+    column = np.full(1, 0.2), np.full(1, 0.9), 0.85 ** np.arange(9.0)[None], 0.0, 0.05, 0.05, 0.0
+    result = float(brf(column, num_streams=4, single_scattering=None))
+    assert result < -0.5
+    np.testing.assert_allclose(result, cdisort_brf(*column, 4, False), rtol=1e-8)
+
+
+@pytest.mark.slow
+def test_128_streams():
+    """As CDISORT at as many, and nearly as half of them; the correction needs no more moments."""
+    columns = simple_columns(count=1, num_layers=3, num_moments=257)
+    many, fewer = (brf(columns, num_streams=n)[0] for n in (128, 64))
+    column = [np.array(x[0]) for x in columns[:3]] + [float(x[0]) for x in columns[3:]]
+    np.testing.assert_allclose(many, cdisort_brf(*column, 128, True), rtol=1e-8)
+    # What quadrature by 64 streams leaves of smooth phase functions.
+    np.testing.assert_allclose(fewer, many, rtol=1e-6)
 
 
 def test_backscatter_is_where_relative_azimuth_is_zero():
