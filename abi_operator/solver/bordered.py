@@ -143,7 +143,8 @@ def between(left: Bordered, middle: Bordered, right: Bordered) -> Bordered:
     """Product ``left middle^-1 right``, the one operation of the whole solver.
 
     `middle` has a positive definite core and diagonal. All three are functions of the same pair of
-    matrices wherever this is called, so that the product is symmetric like its factors.
+    matrices wherever this is called, so that they commute, the product is symmetric like its
+    factors, and the views' rows are found like the sun's column.
     """
     return between_and_quotient(left, middle, right)[0]
 
@@ -152,24 +153,20 @@ def between_and_quotient(
     left: Bordered, middle: Bordered, right: Bordered
 ) -> tuple[Bordered, Quotient]:
     """`between`, and the quotient that it formed on the way (for `left` equal to `right`)."""
-    sun = right.diagonal[:1] / middle.diagonal[:1]
-    views = left.diagonal[1:] / middle.diagonal[1:]
-    source = right.border[:, :1] - middle.border[:, :1] * sun
-    targets = left.border[:, 1:] - middle.border[:, 1:] * views
+    n = right.core.shape[0]
+    ratio = right.diagonal / middle.diagonal
+    source = right.border - middle.border * ratio
     middle_inverse = _inverse(middle.core)
-    n = source.shape[0]
-    solved = _matmul(middle_inverse, jnp.concatenate([right.core, source, targets], axis=1))
-    solved_source, solved_targets = solved[:, n : n + 1], solved[:, n + 1 :]
-    core = _matmul(left.core, solved[:, :n])
-    to_nodes = _matmul(left.core, solved_source) + left.border[:, :1] * sun
-    to_views = _matmul(right.core, solved_targets) + right.border[:, 1:] * views
+    solved = _matmul(middle_inverse, jnp.concatenate([right.core, source], axis=1))
+    product = _matmul(left.core, solved)
+    sun, views = ratio[:1], left.diagonal[1:] / middle.diagonal[1:]
+    target = left.border[:, 1:] - middle.border[:, 1:] * views
     corner = (
-        jnp.sum(targets * solved_source, axis=0)
+        jnp.sum(target * solved[:, n : n + 1], axis=0)
         + left.corner * sun
         + right.corner * views
         - middle.corner * sun * views
     )
-    diagonal = jnp.concatenate([left.diagonal[:1] * sun, views * right.diagonal[1:]])
-    product = Bordered(core, jnp.concatenate([to_nodes, to_views], axis=1), diagonal, corner)
-    ratio = jnp.concatenate([sun, views])
-    return product, Quotient(middle_inverse, solved[:, :n], solved[:, n:], ratio)
+    border = product[:, n:] + left.border * ratio
+    result = Bordered(product[:, :n], border, left.diagonal * ratio, corner)
+    return result, Quotient(middle_inverse, solved[:, :n], solved[:, n:], ratio)
