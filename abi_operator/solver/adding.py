@@ -104,7 +104,7 @@ class Top(eqx.Module):
     inverse: Float[Array, "node node *batch"]
 
     def reflection(self) -> Float[Array, "view *batch"]:
-        r"""Sun -> view entries of (1 + Y)^{-1}, times mu; those of R are twice as large."""
+        r"""Sun -> view entries of (1 + Y)^{-1}: twice the reflectance factor of the mode."""
         border = self.stack.border
         sun = matmul(self.inverse, border[:, :1])
         return 0.5 * (jnp.sum(border[:, 1:] * sun, axis=0) - self.stack.corner)
@@ -120,12 +120,12 @@ class Top(eqx.Module):
         driving = 2 * (incident - planck) * one.nodes + emission.column.nodes
         s = matmul(self.inverse, driving[:, None])
         emerging = emission.column.beams - jnp.sum(self.stack.border * s, axis=0)
-        return planck + 0.5 * emerging / one.beams
+        return planck + 0.5 * emerging
 
     def plane_albedo(self, one: Vector) -> Float[Array, "beam *batch"]:
         """Share of light from each beam that leaves the top, taken by reciprocity."""
         s = matmul(self.inverse, one.nodes[:, None])
-        return -jnp.sum(self.stack.border * s, axis=0) / one.beams
+        return -jnp.sum(self.stack.border * s, axis=0)
 
     def spherical_albedo(self, emission: Emission) -> Float[Array, "*batch"]:
         """What comes back to the ground of its isotropic radiance 1, seen from below."""

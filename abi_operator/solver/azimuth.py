@@ -57,9 +57,9 @@ def mode_kernels(
 def legendre_tables(
     num_streams: int, num_modes: int, cosines: Float[Array, "beam *batch"]
 ) -> LegendreTables:
-    """Evaluate the functions of all modes at the nodes and at the beams."""
+    """Evaluate the functions of all modes at the nodes, and at the beams over their cosines."""
     at_nodes = node_functions(num_streams, num_modes)
-    at_beams = associated_legendre(num_modes, num_streams, cosines)
+    at_beams = associated_legendre(num_modes, num_streams, cosines) / cosines
     nodes, beams = [], []
     for parity in (0, 1):
         rows = [(m, slice((m + parity) % 2, None, 2)) for m in range(num_modes)]

@@ -12,8 +12,9 @@ multiple scattering (c), the particular solution for the sun (b_s), the integrat
 function towards the views (b_v), the exact attenuation of all beams (d) and the answer itself (x),
 and the classical resonances, mu0 at an eigenvalue or equal to mu, do not exist.
 
-Nodes are scaled by sqrt(w mu) and a view's row by mu, which makes every core symmetric. Sun and
-views are then the same kind of border, called *beams*: the sun is beam 0, the views follow.
+Nodes are scaled by sqrt(w mu), which makes every core symmetric, and the sun is counted by what it
+sheds on a level plane. Sun and views are then the same kind of border, called *beams* (the sun is
+beam 0, the views follow), and no product with a cosine is ever undone by a division.
 """
 
 import equinox as eqx
@@ -33,7 +34,7 @@ class Vector(eqx.Module):
     nodes
         At the nodes, times sqrt(w mu).
     beams
-        At the beams, times their cosine.
+        At the beams.
     """
 
     nodes: Float[Array, "node *batch"]

@@ -10,11 +10,11 @@ from .surface import Surface
 
 
 def isotropic(num_streams: int, beams: Float[Array, "beam *batch"]) -> Vector:
-    r"""Radiance 1 in all directions: :math:`\sqrt{w\mu}` at the nodes, mu at the beams."""
+    r"""Radiance 1 in all directions: :math:`\sqrt{w\mu}` at the nodes, 1 at the beams."""
     mu, weight = double_gauss(num_streams)
     shape = (mu.size,) + (1,) * (beams.ndim - 1)
     nodes = jnp.asarray(np.sqrt(weight * mu), beams.dtype).reshape(shape)
-    return Vector(jnp.broadcast_to(nodes, (mu.size, *beams.shape[1:])), beams)
+    return Vector(jnp.broadcast_to(nodes, (mu.size, *beams.shape[1:])), jnp.ones_like(beams))
 
 
 def _identity(num_nodes: int, like: Float[Array, "*batch"]) -> Float[Array, "node node *#batch"]:
@@ -26,14 +26,14 @@ def lambertian(
 ) -> Bordered:
     r"""Admittance of a Lambertian ground in azimuth mode 0; that of every other has albedo 0.
 
-    The reflection is R = 2a v r^T with v = 1 on nodes and views and r = (w mu, mu0, 0), so that
+    The reflection is R = 2a v r^T with v = 1 on nodes and views and r = (w mu, 1, 0), so that
     :math:`Y = 1 - 4a/(1+a)\, rr^T` in the symmetric scaling, r = `isotropic`: regular at albedo 1.
     """
     r = isotropic(num_streams, beams)
     factor = 4 * albedo / (1 + albedo)
     core = _identity(r.nodes.shape[0], albedo) - factor * r.nodes[:, None] * r.nodes[None]
-    border = -factor * r.nodes[:, None] * beams[None]
-    return Bordered(core, border, jnp.ones_like(beams), -factor * beams[0] * beams[1:])
+    border = -factor * r.nodes[:, None] * r.beams[None]
+    return Bordered(core, border, r.beams, -factor * r.beams[1:])
 
 
 def black(beams: Float[Array, "beam *batch"], num_streams: int) -> Bordered:
@@ -60,7 +60,7 @@ def reflecting(
     with_beams = sign * surface.modes(m, nodes[:, None], beams[None])
     one_plus = Bordered(
         _identity(nodes.shape[0], beams[0]) + 2 * among_nodes * r.nodes[:, None] * r.nodes[None],
-        2 * with_beams * r.nodes[:, None] * beams[None],
+        2 * with_beams * r.nodes[:, None],
         jnp.ones_like(beams),
         jnp.zeros_like(beams[1:]),
     )

@@ -43,7 +43,7 @@ class ModeKernels(eqx.Module):
     nodes
         Functions at the nodes.
     beams
-        Functions at the beams: mu0 first, then the views.
+        Functions at the beams over their cosines: the sun first, then the views.
     """
 
     pairs: Float[Array, "node node degree"]

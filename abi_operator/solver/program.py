@@ -152,7 +152,7 @@ def _brf(problem: _Problem, mean: Top, grounds: Bordered | None) -> Float[Array,
     total = mean.reflection()
     if options.num_modes > 1:
         total = total + problem.higher(grounds)
-    brf = total / (2 * mu * mu0)
+    brf = 0.5 * total
     if isinstance(column.albedo, Surface):
         reflected = column.albedo.brdf(mu, mu0[None], column.relative_azimuth)
         brf = brf + reflected * direct_transmission(layers.tau, mu, sun)

@@ -58,7 +58,9 @@ def toa_brf(
         Lambertian albedo of the ground [-], or a `Surface`.
     mu0, mu
         Cosines of the solar and view zenith angles, both above 0. At 1, where the derivative in
-        the cosine is infinite, a finite one is returned. [-]
+        the cosine is infinite, the one with the sine held at 0 is returned, so that by a zenith
+        angle it is 0; from 1e-5 rad on the latter is right (to 1e-4 of the slope at the vertical,
+        to 1e-6 from 1e-3 rad on). [-]
     relative_azimuth
         Azimuth between satellite and sun: 0 on the same side (backscatter), pi in the glint. [rad]
     num_streams
