@@ -15,8 +15,11 @@ def simple_columns(count=4, num_layers=5, num_moments=33, seed=3):
     return tau, ssa, moments, albedo, mu0, mu, azimuth
 
 
-def hard_columns(num_moments=33):
-    """Columns at every place where a formula might break; 50 layers, padded with empty ones."""
+def hard_columns(num_moments=33, num_streams=8):
+    """Columns at every place where a formula might break; 50 layers, padded with empty ones.
+
+    Two nodes of `num_streams` streams are the cosines of "mu0 at a node".
+    """
     rng = np.random.default_rng(11)
     names = [
         "tau 0", "ssa 0", "ssa 1", "mu0 = mu", "mu0 at a node", "exact backscatter",
@@ -34,8 +37,8 @@ def hard_columns(num_moments=33):
     ssa[at["ssa 0"]] = 0
     ssa[at["ssa 1"]] = 1
     mu0[at["mu0 = mu"]] = mu[at["mu0 = mu"]]
-    nodes = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2
-    mu0[at["mu0 at a node"]], mu[at["mu0 at a node"]] = nodes[1], nodes[3]
+    nodes = (np.polynomial.legendre.leggauss(num_streams // 2)[0] + 1) / 2
+    mu0[at["mu0 at a node"]], mu[at["mu0 at a node"]] = nodes[(nodes.size - 1) // 2], nodes[-1]
     mu0[at["exact backscatter"]] = mu[at["exact backscatter"]]
     azimuth[at["exact backscatter"]] = 0
     azimuth[at["glint azimuth"]] = np.pi

@@ -1,0 +1,161 @@
+"""Float32 against float64 on columns nobody chose, both given the same float32 numbers."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from columns import hard_columns, simple_columns
+from random_columns import random_columns
+
+from abi_operator.solver import sufficient_doublings, toa_brf
+
+INPUTS = ("tau", "ssa", "moments", "albedo", "mu0", "mu", "relative_azimuth")
+SEED = 19770701
+# Matrices of order 1 round at 6e-8, some thousand times, mostly with random sign; a BRF below the
+# floor is a small difference of them and is judged against the floor.
+FLOOR = 1e-3
+VALUE_P99, VALUE_P999 = 1e-4, 1e-3
+# Gradients: largest error of an input over that input's largest derivative, but over 1e-3 of the
+# column's BRF where no derivative is larger; as above, a BRF below the floor counts as the floor.
+# "unfloored" figures are without that: nothing is left of a column of 1e-17.
+GRADIENT_FLOOR, GRADIENT_P99 = 1e-3, 1e-3
+CHUNK = 250
+
+
+def chunks(seed, count):
+    """At least `count` columns rounded to float32, as many at a time as fit the memory twice."""
+    rng = np.random.default_rng(seed)
+    for _ in range(math.ceil(count / CHUNK)):
+        yield [np.asarray(x, np.float32) for x in random_columns(rng, CHUNK)]
+
+
+def doublings(num_streams):
+    return sufficient_doublings(200, 0.02, num_streams)
+
+
+def as_double(columns):
+    return [np.asarray(x, np.float64) for x in columns]
+
+
+def report(title, errors):
+    p50, p99, p999 = np.percentile(errors, [50, 99, 99.9])
+    print(f"{title}: p50 {p50:.1e} p99 {p99:.1e} p99.9 {p999:.1e} max {np.max(errors):.1e}")
+    return p99, p999
+
+
+def assert_values(seed, count, num_streams, single_scattering):
+    options = {
+        "num_streams": num_streams,
+        "num_doublings": doublings(num_streams),
+        "single_scattering": single_scattering,
+    }
+    errors = []
+    for columns in chunks(seed, count):
+        single = toa_brf(*columns, **options)
+        assert single.dtype == jnp.float32
+        with jax.enable_x64(True):
+            double = np.asarray(toa_brf(*as_double(columns), **options))
+        assert double.dtype == np.float64
+        errors.append(abs(np.asarray(single) - double) / np.maximum(abs(double), FLOOR))
+    errors = np.concatenate(errors)
+    title = f"seed {seed}, {errors.size} columns, {num_streams} streams, {single_scattering}"
+    p99, p999 = report(title, errors)
+    assert p99 <= VALUE_P99
+    assert p999 <= VALUE_P999
+
+
+def assert_gradients(seed, count, num_streams, single_scattering):
+    def summed(*arguments):
+        values = toa_brf(
+            *arguments,
+            num_streams=num_streams,
+            num_doublings=doublings(num_streams),
+            single_scattering=single_scattering,
+        )
+        return jnp.sum(values), values
+
+    derivative = jax.jit(jax.grad(summed, argnums=tuple(range(len(INPUTS))), has_aux=True))
+    errors = []
+    for columns in chunks(seed, count):
+        single, _ = derivative(*columns)
+        with jax.enable_x64(True):
+            double, value = derivative(*as_double(columns))
+            value = np.asarray(value)
+        errors.append([])
+        for name, s, d in zip(INPUTS, single, double, strict=True):
+            assert s.dtype == jnp.float32
+            s, d = (np.asarray(x, np.float64).reshape(value.size, -1) for x in (s, d))
+            assert np.isfinite(s).all(), name
+            for counts_as in (np.maximum(abs(value), FLOOR), abs(value)):
+                scale = np.maximum(abs(d).max(axis=1), GRADIENT_FLOOR * counts_as)
+                errors[-1].append(abs(s - d).max(axis=1) / scale)
+    errors = np.concatenate(errors, axis=1)
+    errors, unfloored = errors[0::2], errors[1::2]
+    print(f"\nseed {seed}, {errors.shape[1]} columns, {num_streams} streams, {single_scattering}")
+    for name, of_input, bare in zip(INPUTS, errors, unfloored, strict=True):
+        p99, _ = report(f"gradient in {name}", of_input)
+        report("    unfloored", bare)
+        assert p99 <= GRADIENT_P99, name
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize(
+    ("num_streams", "single_scattering"), [(2, "tms"), (4, None), (8, "tms"), (8, None), (16, None)]
+)
+def test_values(num_streams, single_scattering):
+    assert_values(SEED + num_streams, 250, num_streams, single_scattering)
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize("single_scattering", ["tms", None])
+def test_gradients(single_scattering):
+    assert_gradients(SEED, 250, 4, single_scattering)
+
+
+@pytest.mark.float32
+def test_gradients_are_finite_at_every_hard_place():
+    names, columns = hard_columns(num_moments=9)
+    columns = [np.asarray(x, np.float32) for x in columns]
+    derivative = jax.grad(
+        lambda *a: jnp.sum(toa_brf(*a, num_streams=4, num_doublings=13)), argnums=tuple(range(7))
+    )
+    for name, gradient in zip(INPUTS, derivative(*columns), strict=True):
+        finite = np.isfinite(np.reshape(gradient, (len(names), -1))).all(axis=1)
+        assert finite.all(), f"{name}: {[n for n, ok in zip(names, finite, strict=True) if not ok]}"
+
+
+def test_gradients_never_compute_in_float64():
+    columns = [jnp.asarray(x, jnp.float32) for x in simple_columns()]
+    derivative = jax.grad(lambda *a: jnp.sum(toa_brf(*a, num_streams=4)), argnums=tuple(range(7)))
+    assert "f64" not in str(jax.make_jaxpr(derivative)(*columns))
+    double = [x.astype(jnp.float64) for x in columns]  # which is what the word is for
+    assert "f64" in str(jax.make_jaxpr(derivative)(*double))
+
+
+# Long studies leave x64 on: float32 arguments alone decide the precision.
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("num_streams", "single_scattering"),
+    [
+        (2, "tms"),
+        (4, None),
+        (6, "tms"),
+        (8, "tms"),
+        (8, None),
+        (12, None),
+        (16, "tms"),
+        (32, "tms"),
+    ],
+)
+def test_values_of_thousands_of_columns(num_streams, single_scattering, scale):
+    assert_values(SEED + 100 + num_streams, scale * 5000, num_streams, single_scattering)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("num_streams", "single_scattering"), [(2, None), (4, "tms"), (8, "tms"), (8, None)]
+)
+def test_gradients_of_thousands_of_columns(num_streams, single_scattering, scale):
+    assert_gradients(SEED + 200 + num_streams, scale * 2000, num_streams, single_scattering)
