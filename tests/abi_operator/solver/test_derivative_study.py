@@ -115,7 +115,7 @@ def study(seed, count, num_streams, single_scattering):
     assert all(np.isfinite(g).all() for g in gradients)
 
     steps = first_steps(columns, num_streams)
-    mode_error, difference_error = np.zeros((2, len(INPUTS), count))
+    mode_error, bare_error, difference_error = np.zeros((3, len(INPUTS), count))
     undecided = 0
     for k, direction in probes(rng, columns, gradients):
         expand = (count,) + (1,) * (direction.ndim - 1)
@@ -146,9 +146,10 @@ def study(seed, count, num_streams, single_scattering):
         undecided += unsure.sum() / count
         error = np.where(unsure, 0, error) / norm
         difference_error[k] = np.maximum(difference_error[k], error)
-        error = abs(slope - ahead) / np.maximum(largest, MODES_FLOOR)
-        mode_error[k] = np.maximum(mode_error[k], error)
-    return mode_error, difference_error, undecided / len(INPUTS)
+        error = abs(slope - ahead)
+        mode_error[k] = np.maximum(mode_error[k], error / np.maximum(largest, MODES_FLOOR))
+        bare_error[k] = np.maximum(bare_error[k], error / norm)
+    return mode_error, bare_error, difference_error, undecided / len(INPUTS)
 
 
 def report(title, errors):
@@ -157,10 +158,13 @@ def report(title, errors):
 
 
 def assert_study(seed, count, num_streams, single_scattering):
-    mode_error, difference_error, undecided = study(seed, count, num_streams, single_scattering)
+    mode_error, bare_error, difference_error, undecided = study(
+        seed, count, num_streams, single_scattering
+    )
     print(f"\nseed {seed}, {count} columns, {num_streams} streams, {single_scattering}", end="; ")
     print(f"{undecided:.2%} undecided by differences")
     report("reverse - forward", mode_error)
+    report(f"    with a floor of {FLOOR:g} BRF alone", bare_error)
     for name, errors in zip(INPUTS, difference_error, strict=True):
         report(f"reverse - differences, {name}", errors)
     assert mode_error.max() <= MODES_AGREE
