@@ -64,6 +64,8 @@ def promoted(**arguments: Any) -> Column:
     """
     if isinstance(arguments["albedo"], Lambertian):
         arguments["albedo"] = arguments["albedo"].albedo
+    # A list of numbers is an array here, although a pytree of many leaves to JAX.
+    arguments = {k: np.asarray(x) if isinstance(x, list) else x for k, x in arguments.items()}
     leaves, structure = jax.tree.flatten(Column(**arguments))
     arrays = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
     types = [
@@ -88,7 +90,12 @@ def check_shapes(column: Column, num_moments: int, multiple_views: bool) -> None
             sizes.setdefault(axis, []).append((name, size))
     if "level" in sizes:
         name, levels = sizes.pop("level")[0]
-        sizes["layer"].append((f"{name} less one level", levels - 1))
+        num_layers = max(size for _, size in sizes["layer"])
+        if levels - 1 != num_layers:  # levels are not stretched as a single layer is
+            raise ValueError(
+                f"{name} must have one level more than there are layers; got {levels} levels for "
+                f"{num_layers} layers."
+            )
     for axis in ("layer", "view"):
         found = sizes.get(axis, [])
         if len({size for _, size in found} - {1}) > 1:

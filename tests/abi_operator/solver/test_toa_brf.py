@@ -104,6 +104,12 @@ def test_doublings_chosen_from_the_data_equal_more_of_them():
     np.testing.assert_allclose(chosen, traced, rtol=1e-10)
 
 
+def test_lists_are_arrays():
+    columns = simple_columns()
+    listed = [x.tolist() for x in columns]
+    np.testing.assert_array_equal(brf(listed), brf(columns))
+
+
 def test_thick_neighbours_change_nothing_through_the_doublings():
     columns = simple_columns()
     alone = brf([x[:1] for x in columns], num_doublings=None)

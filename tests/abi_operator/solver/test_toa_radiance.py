@@ -157,7 +157,8 @@ def test_several_views_in_one_solve():
 
 def test_shapes_of_the_sources_are_checked():
     columns = simple_columns()
-    with pytest.raises(ValueError, match="same number of layers.*4 in planck_levels less one"):
-        toa_radiance(*columns, solar_irradiance=1.0, planck_levels=np.ones((4, 5)))
+    for num_levels in (2, 5, 7):
+        with pytest.raises(ValueError, match=f"one level more.* got {num_levels} levels for 5 lay"):
+            toa_radiance(*columns, solar_irradiance=1.0, planck_levels=np.ones((4, num_levels)))
     with pytest.raises(ValueError, match=r"do not broadcast.*\(3,\) of surface_emission"):
         toa_radiance(*columns, solar_irradiance=1.0, surface_emission=np.ones(3))
