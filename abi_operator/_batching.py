@@ -11,48 +11,94 @@ streams   16   32   64  128  256 no tiles
 8       1.64 0.79 0.63 0.53 0.63     0.89
 16      3.58 3.11 2.80 2.78 4.33     5.79
 ======= ==== ==== ==== ==== ==== ========
+
+XLA runs the loop over tiles on one core: its loops share their temporary memory and so follow each
+other, however a program is written. It does run several CPU devices at a time, and where JAX has
+more than one (``JAX_NUM_CPU_DEVICES=4``, before JAX is first used) every device takes its share of
+the tiles, under any transformation. What comes back then lies on all of them. Not so where the
+caller settles what runs where: by `jax.default_device`, a mesh, or several processes.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh, PartitionSpec
 from jaxtyping import Array
+
+# A vector unit holds at most so many float64; tiles narrower than a few of these leave it idle.
+_VECTOR = 8
+_FEWEST_A_DEVICE = 4 * _VECTOR
+# A GPU has no cache to keep a tile in, but many units to fill; this bounds its memory alone.
+_GPU_TILE = 4096
 
 
 def tile_size(num_streams: int) -> int:
-    """Columns that are solved together."""
+    """Columns that are solved together, at most."""
+    if jax.default_backend() != "cpu":
+        return _GPU_TILE
     return 256 if num_streams <= 4 else 128 if num_streams <= 8 else 64 if num_streams <= 16 else 16
 
 
 def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
-    """Apply a batch-last `function` to a pytree of arrays tile by tile.
+    """Apply a batch-last `function` to a pytree of arrays tile by tile, on every CPU device.
 
     Parameters
     ----------
     function
         Maps a pytree of arrays whose last axis is the batch to another such.
     columns
-        Its argument; all leaves have the same last axis. A last, partial tile is filled up with
-        copies of the last column, whose results are dropped.
+        Its argument; all leaves have the same last axis. Tiles are equally wide: the last is filled
+        up with copies of the last column, whose results are dropped.
     tile
-        Columns a tile.
+        Columns a tile, at most.
     """
     size = jax.tree.leaves(columns)[0].shape[-1]
-    if size <= tile:
+    devices = _devices()
+    if size < _FEWEST_A_DEVICE * len(devices):
+        devices = devices[:1]
+    count, width = _equal_tiles(size, tile, len(devices))
+    if count == 1:
         return function(columns)
-    count = -(-size // tile)
 
     def tiled(x: Array) -> Array:
-        padding = [(0, 0)] * (x.ndim - 1) + [(0, count * tile - size)]
+        padding = [(0, 0)] * (x.ndim - 1) + [(0, count * width - size)]
         return jnp.moveaxis(
-            jnp.pad(x, padding, mode="edge").reshape(*x.shape[:-1], count, tile), -2, 0
+            jnp.pad(x, padding, mode="edge").reshape(*x.shape[:-1], count, width), -2, 0
         )
 
     def joined(x: Array) -> Array:
-        return jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], count * tile)[..., :size]
+        return jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], count * width)[..., :size]
 
-    # Reverse mode computes a tile again when its turn comes, so that its memory is that of a tile.
-    mapped = jax.lax.map(jax.checkpoint(function), jax.tree.map(tiled, columns))
-    return jax.tree.map(joined, mapped)
+    def mapped(tiles: Any) -> Any:
+        # Reverse mode computes a tile again when its turn comes: its memory is that of a tile.
+        return jax.lax.map(jax.checkpoint(function), tiles)
+
+    if len(devices) > 1:
+        share = PartitionSpec("device")
+        mesh = Mesh(np.asarray(devices), ("device",))
+        # Nothing is exchanged between the devices, so there is nothing to check.
+        mapped = jax.shard_map(mapped, mesh=mesh, in_specs=share, out_specs=share, check_vma=False)
+    return jax.tree.map(joined, mapped(jax.tree.map(tiled, columns)))
+
+
+def _devices() -> list[Any]:
+    """CPU devices that are this program's to use; one of them stands for wherever JAX runs it."""
+    devices = jax.local_devices()
+    settled = (
+        jax.config.jax_default_device is not None  # pyright: ignore[reportAttributeAccessIssue]
+        or not jax.sharding.get_abstract_mesh().empty
+        or jax.process_count() > 1
+    )
+    return devices[:1] if settled or devices[0].platform != "cpu" else devices
+
+
+def _equal_tiles(size: int, tile: int, num_devices: int) -> tuple[int, int]:
+    """Number of tiles, the same for every device, and their width: as narrow as the number lets."""
+    share = math.ceil(size / num_devices)
+    count = max(1, math.ceil(share / tile))
+    width = min(tile, _VECTOR * math.ceil(share / count / _VECTOR))
+    return count * num_devices, width

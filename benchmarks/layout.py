@@ -26,7 +26,7 @@ from abi_operator.solver import toa_brf
 from retrievals import retrieve_smoke
 from retrievals.chunks import map_chunks
 
-NUM_COLUMNS, NUM_LAYERS, NUM_DOUBLINGS = 1024, 24, 3
+NUM_COLUMNS, NUM_LAYERS, NUM_DOUBLINGS = 1024, 24, 2
 SOLVER = sys.modules["abi_operator.solver.toa_brf"]
 
 

@@ -10,7 +10,6 @@ against batch, layers, streams or precision, memory and compiling, Jacobians and
 """
 
 import argparse
-import os
 import platform
 import sys
 from dataclasses import replace
@@ -78,7 +77,7 @@ def agreement(peers, streams, bars):
             peers.put(given)
             peers.solve("sasktran2 + derivatives", n, 16)
             shared = workload.arguments(given.with_geometry_of_first(), n)[:7]
-            options = {"num_streams": n, "num_doublings": workload.doublings(n)}
+            options = {"num_streams": n, "num_doublings": workload.NUM_DOUBLINGS}
             plain = workload.gradient(options | {"single_scattering": None})
             slopes = plain(*shared)[1]
             ours = np.concatenate([slopes[0], slopes[1], slopes[3][:, None]], axis=1)
@@ -104,7 +103,7 @@ def main_table(rounds, options, bars):
         truth_one.append(rounds.peers.solve("one geometry", TRUE_STREAMS, few)[0])
     rows, notes = [], []
     for n in options.streams:
-        k, names = workload.doublings(n), usable_peers(n)
+        k, names = workload.NUM_DOUBLINGS, usable_peers(n)
         settings = {"num_streams": n, "num_doublings": k}
         programs = {
             "value": Program(workload.value(settings)),
@@ -187,8 +186,7 @@ def main():
     parser.add_argument("--largest", type=int, default=100_000, help="batch of the sweeps")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
-    jax.config.update("jax_enable_x64", True)
-    cores = len(os.sched_getaffinity(0))
+    cores = workload.use_all_cores()
     found = {name: peer_version(name) or "MISSING" for name in PEERS}
     versions = ", ".join(f"{k} {v}" for k, v in found.items() if "+" not in k)
     print(f"abi-operator {__version__}, jax {jax.__version__}, {versions}")

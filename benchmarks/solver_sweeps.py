@@ -32,7 +32,7 @@ COPIES = 6
 
 
 def both(num_streams):
-    settings = {"num_streams": num_streams, "num_doublings": workload.doublings(num_streams)}
+    settings = {"num_streams": num_streams, "num_doublings": workload.NUM_DOUBLINGS}
     return {
         "value": Program(workload.value(settings)),
         "value + gradient": Program(workload.gradient(settings)),
@@ -44,7 +44,7 @@ def sweep(rounds: Rounds, label, cases, bars):
     found, rows = {}, []
     for case, n, layers, count, dtype in cases:
         t = rounds.run(both(n), n, layers, count, ["nanodisort"], dtype=dtype)
-        row, error = [case, workload.doublings(n)], {}
+        row, error = [case, workload.NUM_DOUBLINGS], {}
         for name in ("value", "value + gradient"):
             row += [digits(t[name].microseconds), t[name].spread]
             error[name] = apart(t[name].brf, t["nanodisort"].brf)
@@ -114,7 +114,7 @@ def derivatives(rounds, options, bars):
     """`jax.vmap` of the call for one column, several views, and retrievals' Jacobians."""
     count = options.columns - options.columns % workload.NUM_BANDS
     for n in options.sweep_streams or USUAL_STREAMS:
-        settings = {"num_streams": n, "num_doublings": workload.doublings(n)}
+        settings = {"num_streams": n, "num_doublings": workload.NUM_DOUBLINGS}
 
         def whole(given, _):
             return (given,)
@@ -230,7 +230,7 @@ def prepared(seed, num_streams, count, num_layers, part=1000):
 def main():
     name, *sizes = sys.argv[1:]
     num_streams, count, num_layers = map(int, sizes)
-    jax.config.update("jax_enable_x64", True)
+    workload.use_all_cores()
     program, seconds = both(num_streams)[name].call, []
     # The second call's peak counts: with the first one's arguments gone, and compiled.
     for seed in range(2):

@@ -4,6 +4,7 @@ Every program takes and gives NumPy arrays: moving them to the device, transposi
 the results back are part of its time.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -16,12 +17,12 @@ import numpy as np
 from abi_operator.solver import (
     cos_scattering_angle,
     double_gauss,
-    sufficient_doublings,
     toa_brf,
 )
 
 MAX_TAU, MIN_MU, MAX_MU = 30.0, 0.2, 0.95
 MOST_STREAMS = 64
+NUM_DOUBLINGS = 2  # right to 1e-5 up to MAX_TAU, see `layer.half_layer`
 NODE_DISTANCE = 5e-4  # relative; CDISORT refuses a sun within 1e-4 of one of its own directions
 NUM_STATES, NUM_BANDS, NUM_VIEWS = 10, 3, 3
 
@@ -85,9 +86,12 @@ def henyey_greenstein(asymmetry, cosine):
     return (1 - asymmetry**2) / (1 + asymmetry**2 - 2 * asymmetry * cosine) ** 1.5
 
 
-def doublings(num_streams):
-    """The number that every program of ours is given."""
-    return sufficient_doublings(MAX_TAU, MIN_MU, num_streams)
+def use_all_cores():
+    """Float64, and a CPU device of JAX for each core that the command may use; their number."""
+    cores = len(os.sched_getaffinity(0))
+    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_num_cpu_devices", cores)
+    return cores
 
 
 def arguments(given: Columns, num_streams, dtype=np.float64, series=None):

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._numerics import inverse, matmul
-from .bordered import Bordered, Quotient, Vector, between_and_quotient
+from .bordered import Bordered, Quotient, Vector, minus_and_quotient
 
 
 class Emission(eqx.Module):
@@ -92,8 +92,8 @@ def _add(stack, admittance, impedance, tau) -> tuple[Bordered, Quotient]:
     h = 0.5 * tau
     total = stack + admittance
     middle = h * stack + 0.5 * (impedance + h * admittance)
-    product, quotient = between_and_quotient(total, middle, total)
-    added = total + admittance - h * product
+    base = [(1.0, total), (1.0, admittance)]
+    added, quotient = minus_and_quotient(base, h, total, middle, total)
     return eqx.tree_at(lambda m: m.diagonal, added, jnp.ones_like(added.diagonal)), quotient
 
 

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._batching import map_tiles, tile_size
+from .._batching import tile_size
 from .column import Column, Options, aligned, promoted
+from .derivative import independent_columns
 from .program import GroundResponse, ground_response, plane_albedo
 from .surface import Surface
 from .toa_brf import outward, prepare
@@ -153,14 +154,18 @@ def surface_coupling(
 @partial(jax.jit, static_argnums=1)
 def _plane_albedo(column: Column, options: Options) -> Array:
     columns, batch = aligned(column, True)
-    tile = tile_size(options.num_streams)
-    return map_tiles(lambda tiles: plane_albedo(tiles, options), columns, tile).reshape(batch)
+    solve = independent_columns(
+        lambda tile: plane_albedo(tile, options), tile_size(options.num_streams)
+    )
+    return solve(columns).reshape(batch)
 
 
 @partial(jax.jit, static_argnums=(1, 2))
 def _ground_response(column: Column, options: Options, multiple_views: bool) -> GroundResponse:
     columns, batch = aligned(column, multiple_views)
-    tile = tile_size(options.num_streams)
-    found = map_tiles(lambda tiles: ground_response(tiles, options), columns, tile)
+    solve = independent_columns(
+        lambda tile: ground_response(tile, options), tile_size(options.num_streams)
+    )
+    found = solve(columns)
     black, coupling = (outward(x, batch, multiple_views) for x in found[:2])
     return GroundResponse(black, coupling, found.spherical_albedo.reshape(batch))

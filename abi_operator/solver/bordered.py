@@ -17,13 +17,23 @@ sheds on a level plane. Sun and views are then the same kind of border, called *
 beam 0, the views follow), and no product with a cosine is ever undone by a division.
 """
 
+from collections.abc import Sequence
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import fenced, inverse, matmul
+from .._numerics import (
+    fenced,
+    inverse,
+    kernel_of_product,
+    matmul,
+    minus_product,
+    product,
+    weighted,
+)
 
-_inverse, _matmul = fenced(inverse), fenced(matmul)
+_ONE_KERNEL = 2  # nodes up to which a product of three matrices is computed in one pass
 
 
 class Vector(eqx.Module):
@@ -96,14 +106,14 @@ class Bordered(eqx.Module):
         """
         to_beams = jnp.sum(self.border * vector.nodes[:, None], axis=0)
         return Vector(
-            _matmul(self.core, vector.nodes[:, None])[:, 0],
+            matmul(self.core, vector.nodes[:, None])[:, 0],
             to_beams + self.diagonal * vector.beams,
         )
 
     def inverse(self) -> "Bordered":
         """Inverse of a matrix with positive definite core and diagonal."""
-        core = _inverse(self.core)
-        solved = _matmul(core, self.border)
+        core = inverse(self.core)
+        solved = matmul(core, self.border)
         between = jnp.sum(self.border[:, 1:] * solved[:, :1], axis=0)
         return Bordered(
             core,
@@ -140,34 +150,111 @@ class Quotient(eqx.Module):
         return Vector(nodes, beams + self.ratio * vector.beams)
 
 
-def between(left: Bordered, middle: Bordered, right: Bordered) -> Bordered:
-    """Product ``left middle^-1 right``, the one operation of the whole solver.
+Terms = Sequence[tuple[float | Float[Array, "*batch"], Bordered]]
+
+
+def minus_quotient(
+    base: Terms,
+    factor: Float[Array, "*batch"],
+    left: Bordered,
+    middle: Bordered,
+    right: Bordered,
+) -> Bordered:
+    """Weighted sum of `base` minus ``factor left middle^-1 right``, the solver's one operation.
 
     `middle` has a positive definite core and diagonal. All three are functions of the same pair of
     matrices wherever this is called, so that they commute, the product is symmetric like its
-    factors, and the views' rows are found like the sun's column.
+    factors, and the views' rows are found like the sun's column. Taking the sum along saves a pass
+    over all matrices.
     """
-    return between_and_quotient(left, middle, right)[0]
-
-
-def between_and_quotient(
-    left: Bordered, middle: Bordered, right: Bordered
-) -> tuple[Bordered, Quotient]:
-    """`between`, and the quotient that it formed on the way (for `left` equal to `right`)."""
-    n = right.core.shape[0]
-    ratio = right.diagonal / middle.diagonal
-    source = right.border - middle.border * ratio
-    middle_inverse = _inverse(middle.core)
-    solved = _matmul(middle_inverse, jnp.concatenate([right.core, source], axis=1))
-    product = _matmul(left.core, solved)
-    sun, views = ratio[:1], left.diagonal[1:] / middle.diagonal[1:]
-    target = left.border[:, 1:] - middle.border[:, 1:] * views
-    corner = (
-        jnp.sum(target * solved[:, n : n + 1], axis=0)
-        + left.corner * sun
-        + right.corner * views
-        - middle.corner * sun * views
+    if left.core.shape[0] > _ONE_KERNEL:
+        return minus_and_quotient(base, factor, left, middle, right)[0]
+    ratio = _ratio(right.diagonal, middle.diagonal)
+    own = ratio if left is right else _ratio(left.diagonal, middle.diagonal)
+    middle_inverse = inverse(middle.core)
+    cores, borders, diagonals, corners = _parts(base)
+    drive = (left.border, right.border, middle.border, middle_inverse)
+    passed = (left.corner, right.corner, middle.corner, ratio, own)
+    return Bordered(
+        _core_at_once(cores, factor, left.core, middle_inverse, right.core),
+        _border_at_once(borders, factor, left.core, *drive, ratio),
+        _minus_diagonal(diagonals, factor, left.diagonal, ratio),
+        _corner_at_once(corners, factor, *drive, *passed),
     )
-    border = product[:, n:] + left.border * ratio
-    result = Bordered(product[:, :n], border, left.diagonal * ratio, corner)
-    return result, Quotient(middle_inverse, solved[:, :n], solved[:, n:], ratio)
+
+
+def minus_and_quotient(
+    base: Terms,
+    factor: Float[Array, "*batch"],
+    left: Bordered,
+    middle: Bordered,
+    right: Bordered,
+) -> tuple[Bordered, Quotient]:
+    """`minus_quotient`, and the quotient ``middle^-1 right`` that it formed on the way."""
+    ratio = _ratio(right.diagonal, middle.diagonal)
+    source = _source(right.border, middle.border, ratio)
+    middle_inverse = inverse(middle.core)
+    solved = matmul(middle_inverse, right.core)
+    driven = matmul(middle_inverse, source)
+    own, target = ratio, source
+    if left is not right:
+        own = _ratio(left.diagonal, middle.diagonal)
+        target = _source(left.border, middle.border, own)
+    cores, borders, diagonals, corners = _parts(base)
+    passed = (left.corner, right.corner, middle.corner, ratio, own)
+    minus_border = kernel_of_product(_minus_border, left.core.shape[1])
+    result = Bordered(
+        minus_product(cores, factor, left.core, solved),
+        minus_border(borders, factor, left.core, driven, left.border, ratio),
+        _minus_diagonal(diagonals, factor, left.diagonal, ratio),
+        _corner(corners, factor, target, driven, *passed),
+    )
+    return result, Quotient(middle_inverse, solved, driven, ratio)
+
+
+def _parts(base):
+    return tuple(
+        [(weight, getattr(x, part)) for weight, x in base]
+        for part in ("core", "border", "diagonal", "corner")
+    )
+
+
+def _ratio(right, middle):
+    return right / middle
+
+
+def _source(border, middle, ratio):
+    return border - middle * ratio
+
+
+def _minus_border(base, factor, core, driven, border, ratio):
+    return weighted(base) - factor * (product(core, driven) + border * ratio)
+
+
+def _minus_diagonal(base, factor, left, ratio):
+    return weighted(base) - factor * (left * ratio)
+
+
+def _corner(base, factor, target, driven, left, right, middle, ratio, own):
+    nodes = jnp.sum(target[:, 1:] * driven[:, :1], axis=0)
+    sun, views = ratio[:1], own[1:]
+    corner = nodes + left * sun + right * views - middle * sun * views
+    return weighted(base) - factor * corner
+
+
+@fenced
+def _core_at_once(base, factor, left, middle_inverse, right):
+    return weighted(base) - factor * product(left, product(middle_inverse, right))
+
+
+@fenced
+def _border_at_once(base, factor, core, left, right, middle, middle_inverse, ratio):
+    driven = product(middle_inverse, right - middle * ratio)
+    return weighted(base) - factor * (product(core, driven) + left * ratio)
+
+
+@fenced
+def _corner_at_once(base, factor, left, right, middle, middle_inverse, *passed):
+    ratio, own = passed[-2:]
+    driven = product(middle_inverse, right[:, :1] - middle[:, :1] * ratio[:1])
+    return _corner(base, factor, left - middle * own, driven, *passed)

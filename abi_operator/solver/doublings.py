@@ -6,10 +6,10 @@ from .quadrature import double_gauss
 
 # Largest z = tau' / (2 mu_min) of a layer for which the start of `layer.half_layer`, doubled
 # 0, 1, 2, 3, 4 times, errs by 1e-12 or less; four times as much for each doubling after that.
-_REACH = (0.317, 0.648, 1.40, 65.8, 269.0)
+_REACH = (0.0356, 0.0713, 0.142, 0.287, 179.0)
 
 # Numbers of doublings that `num_doublings=None` chooses from: few, so that few programs compile.
-_BUCKETS = (1, 3, 5, 7, 9, 13)
+_BUCKETS = (1, 4, 5, 6, 8, 14)
 
 # What a program must be right for when its layers are not known as it is traced.
 _UNKNOWN_TAU, _UNKNOWN_MU = 1e5, 1e-3

@@ -19,13 +19,12 @@ divided by h, so that empty layers need no care.
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._numerics import matmul
-from .bordered import Bordered, between
+from .._numerics import matmul, weighted_sum
+from .bordered import Bordered, minus_quotient
 from .legendre import associated_legendre
 from .quadrature import double_gauss
 
@@ -80,9 +79,9 @@ def layer_matrix(
     num_nodes = kernels.nodes.shape[0]
     mu = jnp.asarray(double_gauss(2 * num_nodes)[0], moments.dtype)
     inverse_mu = jnp.diag(1 / mu).reshape(num_nodes, num_nodes, *(1,) * (moments.ndim - 1))
-    core = inverse_mu - jnp.tensordot(kernels.pairs, moments, axes=1)
+    core = inverse_mu - weighted_sum(kernels.pairs, moments)
     weighted = jnp.swapaxes(moments * kernels.beams, 0, 1)
-    border = -jnp.tensordot(kernels.nodes, weighted, axes=1)
+    border = -weighted_sum(kernels.nodes, weighted)
     corner = jnp.zeros_like(secants[1:])
     if single_scattering:
         corner = -jnp.sum(moments * kernels.beams[0] * kernels.beams[1:], axis=1)
@@ -108,19 +107,31 @@ def conservative(matrix: Bordered, coalbedo: Float[Array, "*batch"]) -> Bordered
     return eqx.tree_at(lambda m: m.core, matrix, core)
 
 
+def start_coefficient(num_doublings: int) -> float:
+    r"""The number d in the start of `half_layer`.
+
+    The start agrees with :math:`\sqrt x\coth\sqrt x` to the second order for any d. From four
+    doublings on d = 10/21, the continued fraction, right to one order more. Below, d = 11/30 keeps
+    the start near 1 up to larger x, so that doubling, which pulls everything there to 1, settles
+    one or two steps earlier: two doublings are right to 1e-5 of the reflectance for thin layers
+    and one of tau = 30, at 4 to 32 streams.
+    """
+    return 11 / 30 if num_doublings <= 3 else 10 / 21
+
+
 def half_layer(
     a: Bordered, b_inverse: Bordered, tau: Float[Array, "*batch"], num_doublings: int
 ) -> tuple[Bordered, Bordered]:
     r"""Admittance Y and h-fold impedance Z of half a layer, from A and the inverse of B.
 
-    The start uses the continued fraction of :math:`\sqrt x\coth\sqrt x` down to 9,
+    The start is rational,
 
     .. math::
-       \varphi(x)^{-1} = 1 + x/(3 + x/(5 + x/(7 + x/9))) =
-       \frac{945 + 420x + 15x^2}{945 + 105x + x^2},
+       \varphi(x)^{-1} = 1 + x\left(\frac13 - \frac{x/9}{5 + dx}\right),
 
-    read from the inside with x = h^2 B A as matrices that stay symmetric: a term a/t with
-    t = k + x/t' is A/k - (h/k)^2 A (t'/b + h^2 A/k)^{-1} A. Doubling is
+    with d = `start_coefficient`. With x = h^2 BA and matrices that stay symmetric,
+    :math:`C = A/3 - (h^2/9) A (5B^{-1} + dh^2A)^{-1}A`, Z = B^-1 + h^2 C and
+    :math:`Y = hA - h^3 A Z^{-1} C`. Doubling is
 
     .. math:: Z_{2h} = Z_h + h Y_h, \qquad Y_{2h} = 2 (Y_h - h Y_h Z_{2h}^{-1} Y_h).
 
@@ -130,18 +141,14 @@ def half_layer(
     """
     h = tau * (0.5 / 2**num_doublings)
     square = h * h
-    inner = (1 / 7) * a - (square / 49) * between(a, 9.0 * b_inverse + (square / 7) * a, a)
-    inner = 5.0 * b_inverse + square * ((1 / 3) * a + inner)
-    fraction = (1 / 3) * a - (square / 9) * between(a, inner, a)
+    start = start_coefficient(num_doublings)
+    inner = 5.0 * b_inverse + start * square * a
+    fraction = minus_quotient([(1 / 3, a)], square / 9, a, inner, a)
     impedance = b_inverse + square * fraction
-    admittance = h * a - (h * square) * between(a, impedance, fraction)
+    admittance = minus_quotient([(h, a)], h * square, a, impedance, fraction)
 
-    def double(carry, _):
-        admittance, impedance, h = carry
+    for _ in range(num_doublings):
         impedance = impedance + h * admittance
-        admittance = 2.0 * (admittance - h * between(admittance, impedance, admittance))
-        return (admittance, impedance, 2 * h), None
-
-    carry = (admittance, impedance, h)
-    (admittance, impedance, _), _ = jax.lax.scan(double, carry, length=num_doublings)
+        admittance = minus_quotient([(2.0, admittance)], 2 * h, admittance, impedance, admittance)
+        h = 2 * h
     return admittance, impedance

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .adding import Emission, Top, emitting_ground
+from .adjoint import ModeSum, mode_sum
 from .azimuth import (
     Directions,
     LegendreTables,
@@ -14,6 +15,7 @@ from .azimuth import (
     emitting_mean,
     higher_modes,
     legendre_tables,
+    weighted_moments,
 )
 from .bordered import Bordered, Vector
 from .column import Column, Options
@@ -54,7 +56,7 @@ def emerging(column: Column, options: Options) -> Emerging:
     mean, others = _grounds(column.albedo, problem)
     shine = (column.planck_levels, column.surface_emission, column.isotropic_top)
     if all(x is None for x in shine):
-        return Emerging(_brf(problem, problem.mean(mean), others), None)
+        return Emerging(_brf(problem, problem.reflection(mean, others)), None)
     zero = jnp.zeros_like(column.mu0)
     planck, from_ground, from_above = (zero if x is None else x for x in shine)
     jumps = None if column.planck_levels is None else planck[1:] - planck[:-1]
@@ -62,7 +64,7 @@ def emerging(column: Column, options: Options) -> Emerging:
     emission = emitting_ground(mean, problem.one, from_ground, at_ground)
     top, emission = problem.emitting_mean(mean, emission, jumps)
     emitted = top.emerging(emission, problem.one, from_above, at_top)[1:]
-    return Emerging(_brf(problem, top, others), emitted)
+    return Emerging(_brf(problem, top.reflection() + problem.higher(others)), emitted)
 
 
 def ground_response(column: Column, options: Options) -> GroundResponse:
@@ -79,7 +81,9 @@ def ground_response(column: Column, options: Options) -> GroundResponse:
     top, emission = problem.emitting_mean(ground, emission, None)
     transmission = top.emerging(emission, problem.one, zero, zero)
     return GroundResponse(
-        _brf(problem, top, None), transmission[0] * transmission[1:], top.spherical_albedo(emission)
+        _brf(problem, top.reflection() + problem.higher(None)),
+        transmission[0] * transmission[1:],
+        top.spherical_albedo(emission),
     )
 
 
@@ -120,6 +124,28 @@ class _Problem:
         shared = self._shared()
         return emitting_mean(*shared, ground, emission, self.one, planck_jumps, **self._how())
 
+    def reflection(self, mean: Bordered, others: Bordered | None) -> Float[Array, "view *batch"]:
+        """Twice the sum over all modes; one view's has its derivative written out."""
+        if self.column.mu.shape[0] > 1:
+            return self.mean(mean).reflection() + self.higher(others)
+        order = jnp.arange(self.options.num_modes)
+        order = order.reshape(-1, *(1,) * self.column.mu0.ndim)
+        azimuth = self.column.relative_azimuth
+        sign = jnp.where(order == 0, 1, jnp.where(order % 2 == 0, 2, -2)).astype(azimuth.dtype)
+        even, odd = weighted_moments(self.layers)
+        inputs = ModeSum(
+            tau=self.layers.tau,
+            coalbedo=self.layers.coalbedo,
+            sun_secants=self.directions.sun_secants,
+            view_secant=1 / self.directions.cosines[1],
+            moments=(even, odd),
+            beams=self.tables.beams,
+            ground=mean,
+            grounds=others,
+            weights=sign * jnp.cos(order.astype(azimuth.dtype) * azimuth),
+        )
+        return mode_sum(inputs, self.options.num_doublings, not self.options.tms)[None]
+
     def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:
         azimuth = self.column.relative_azimuth
         return higher_modes(*self._shared(), grounds, azimuth, **self._how())
@@ -145,14 +171,11 @@ def _grounds(albedo: Array | Surface, problem: _Problem) -> tuple[Bordered, Bord
     return jax.tree.map(lambda x: x[0], grounds), jax.tree.map(lambda x: x[1:], grounds)
 
 
-def _brf(problem: _Problem, mean: Top, grounds: Bordered | None) -> Float[Array, "view *batch"]:
-    """Sum of the modes, and of what is scattered or reflected once and added exactly."""
+def _brf(problem: _Problem, reflection: Float[Array, "view *batch"]) -> Float[Array, "view *batch"]:
+    """Twice the modes' sum halved, and what is scattered or reflected once and added exactly."""
     column, options, layers = problem.column, problem.options, problem.layers
     mu0, mu, sun = column.mu0, column.mu, problem.directions.sun_secants
-    total = mean.reflection()
-    if options.num_modes > 1:
-        total = total + problem.higher(grounds)
-    brf = 0.5 * total
+    brf = 0.5 * reflection
     if isinstance(column.albedo, Surface):
         reflected = column.albedo.brdf(mu, mu0[None], column.relative_azimuth)
         brf = brf + reflected * direct_transmission(layers.tau, mu, sun)

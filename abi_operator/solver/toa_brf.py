@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._batching import map_tiles, tile_size
+from .._batching import tile_size
 from .checks import check_arguments
 from .column import (
     Column,
@@ -17,6 +17,7 @@ from .column import (
     choose_doublings,
     promoted,
 )
+from .derivative import independent_columns
 from .program import emerging
 from .surface import Surface
 
@@ -159,10 +160,10 @@ def prepare(
 @partial(jax.jit, static_argnums=(1, 2))
 def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
     columns, batch = aligned(column, multiple_views)
-    brf = map_tiles(
-        lambda tile: emerging(tile, options).brf, columns, tile_size(options.num_streams)
+    solve = independent_columns(
+        lambda tile: emerging(tile, options).brf, tile_size(options.num_streams)
     )
-    return outward(brf, batch, multiple_views)
+    return outward(solve(columns), batch, multiple_views)
 
 
 def outward(x: Array, batch: tuple[int, ...], multiple_views: bool) -> Array:

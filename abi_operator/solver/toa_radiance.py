@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._batching import map_tiles, tile_size
+from .._batching import tile_size
 from .column import Column, Options, aligned, promoted
+from .derivative import independent_columns
 from .program import emerging
 from .surface import Surface
 from .toa_brf import outward, prepare
@@ -124,5 +125,5 @@ def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
         reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf
         return reflected if emitted is None else reflected + emitted
 
-    result = map_tiles(radiance, columns, tile_size(options.num_streams))
-    return outward(result, batch, multiple_views)
+    solve = independent_columns(radiance, tile_size(options.num_streams))
+    return outward(solve(columns), batch, multiple_views)

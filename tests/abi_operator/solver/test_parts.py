@@ -8,7 +8,7 @@ import pytest
 from abi_operator._batching import map_tiles
 from abi_operator._numerics import inverse, matmul, safe_divide, safe_sqrt
 from abi_operator.solver import double_gauss, sufficient_doublings
-from abi_operator.solver.bordered import Bordered, Vector, between, between_and_quotient
+from abi_operator.solver.bordered import Bordered, Vector, minus_and_quotient, minus_quotient
 from abi_operator.solver.delta_m import delta_m
 from abi_operator.solver.doublings import _REACH, unknown_doublings
 from abi_operator.solver.layer import half_layer
@@ -67,7 +67,7 @@ def test_bordered_matrices_act_on_light_without_a_sun():
     # With the sun as a view, which its symmetric kind allows, the matrix is this one.
     plain = np.append(vector.nodes, vector.beams)
     np.testing.assert_allclose(np.append(*leaves(a @ vector)), as_views(a) @ plain, rtol=1e-12)
-    _, quotient = between_and_quotient(a, b, a)
+    _, quotient = minus_and_quotient([(1.0, a)], jnp.ones(()), a, b, a)
     expected = as_views(a) @ np.linalg.inv(as_views(b)) @ plain
     found = np.append(*leaves(quotient.transposed_action(vector)))
     np.testing.assert_allclose(found, expected, rtol=1e-12)
@@ -109,20 +109,24 @@ def dense(matrix):
     return full
 
 
-def test_bordered_algebra_is_matrix_algebra():
+@pytest.mark.parametrize("nodes", [1, 2, 3, 8, 17])  # each way a product is computed
+def test_bordered_algebra_is_matrix_algebra(nodes):
     rng = np.random.default_rng(0)
-    a, b, c = (random_bordered(rng) for _ in range(3))
+    a, b, c = (random_bordered(rng, nodes) for _ in range(3))
     np.testing.assert_allclose(dense(a.inverse()), np.linalg.inv(dense(a)), rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(dense(2.0 * a - b), 2 * dense(a) - dense(b))
-    # `between` finds the views' rows like the sun's column, right where the product is symmetric as
+    # The views' rows are found like the sun's column, right where the product is symmetric as
     # everywhere in the solver: here for left = right, where both factors are of symmetric kind.
+    factor = jnp.asarray(0.7)
     symmetric = dense(a) @ np.linalg.inv(dense(b)) @ dense(a)
-    np.testing.assert_allclose(dense(between(a, b, a)), symmetric, rtol=1e-12, atol=1e-13)
-    product = dense(between(a, b, c))
-    expected = dense(a) @ np.linalg.inv(dense(b)) @ dense(c)
-    n = 3
-    np.testing.assert_allclose(product[:, n], expected[:, n], rtol=1e-12, atol=1e-13)
-    np.testing.assert_allclose(product[:n, :n], expected[:n, :n], rtol=1e-12, atol=1e-13)
+    difference = minus_quotient([(2.0, c), (factor, a)], factor, a, b, a)
+    expected = 2 * dense(c) + 0.7 * dense(a) - 0.7 * symmetric
+    np.testing.assert_allclose(dense(difference), expected, rtol=1e-12, atol=1e-13)
+    difference = dense(minus_quotient([(1.0, c)], factor, a, b, c))
+    expected = dense(c) - 0.7 * dense(a) @ np.linalg.inv(dense(b)) @ dense(c)
+    np.testing.assert_allclose(difference[:, nodes], expected[:, nodes], rtol=1e-12, atol=1e-13)
+    core = np.s_[:nodes, :nodes]
+    np.testing.assert_allclose(difference[core], expected[core], rtol=1e-12, atol=1e-13)
 
 
 def test_kernels_read_the_same_alone_and_in_a_batch():
@@ -163,9 +167,9 @@ def test_safe_functions_have_values_and_slopes_where_others_do_not():
 
 
 def test_more_doublings_for_thicker_layers_and_lower_sun():
-    assert sufficient_doublings(0.01, 0.5, 8) == 1
-    assert sufficient_doublings(1e5, 1e-3, 8) <= 13
-    steps = [sufficient_doublings(t, 0.3, 8) for t in (0.01, 1, 30, 1e3, 1e6)]
+    assert sufficient_doublings(0.005, 0.5, 8) == 1
+    assert sufficient_doublings(1e5, 1e-3, 8) <= 14
+    steps = [sufficient_doublings(t, 0.3, 8) for t in (0.001, 1, 30, 1e3, 1e6)]
     assert steps == sorted(steps)
     for num_streams in (2, 16, 128):  # at 128 streams the smallest cosine is below 1e-3
         assert unknown_doublings(num_streams) >= sufficient_doublings(1e5, 1e-3, num_streams)

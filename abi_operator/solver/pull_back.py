@@ -1,0 +1,270 @@
+r"""Pull-backs of the parts of one layer: doublings, start, inverse, and what A and B are made of.
+
+Cotangents are `Bordered`, with a symmetric core where the next step asks for one. Of the admittance
+Y_e they are P, of the impedance hQ with the half thickness h of that stage, of A and B they are
+`adjoint`'s over h: nothing is ever divided by h.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._numerics import fenced, product, transpose
+from .bordered import Bordered
+from .fields import Action, Edge, both_sides, edge, side, symmetric, total
+from .layer import ModeKernels
+from .quadrature import double_gauss
+
+
+def undouble(
+    quotient: Action, h: Float[Array, "*batch"], y_bar: Bordered, z_bar: Bordered
+) -> tuple[Bordered, Bordered]:
+    """Cotangents P and Q before a doubling of the layer's half h from those after it."""
+    once = side(quotient, y_bar)
+    z_core = _z_core(
+        z_bar.core, once.core, once.border, quotient.border, y_bar.corner, quotient.core
+    )
+    y_core = _y_core(h, y_bar.core, y_bar.border, once.core, quotient.border, z_core)
+    z_edge, y_edge = _undouble_edges(
+        h, quotient.ratio, once.border, once.diagonal, edge(y_bar), edge(z_bar)
+    )
+    return Bordered(y_core, *y_edge), Bordered(z_core, *z_edge)
+
+
+@fenced
+def _z_core(z_core, core, border, sent, corner, left):
+    return 2 * z_core + 2 * both_sides(core, border, sent, corner, left)
+
+
+@fenced
+def _y_core(h, y_core, y_border, once, sent, z_core):
+    one_side = 2 * once + product(y_border, transpose(sent))
+    return 2 * y_core - 2 * h * symmetric(one_side) + h * h * z_core
+
+
+def _twice(ratio, border, diagonal, x: Edge):
+    """Edge with a quotient on both sides."""
+    return Edge(ratio * border, ratio * diagonal, ratio[:1] * ratio[1:] * x.corner)
+
+
+def _each(ratio, border, diagonal, x: Edge):
+    """Sum of the edges with a quotient on either side."""
+    return Edge(
+        ratio * x.border + border, ratio * x.diagonal + diagonal, (ratio[:1] + ratio[1:]) * x.corner
+    )
+
+
+@fenced
+def _undouble_edges(h, ratio, border, diagonal, y_bar, z_bar):
+    twice, each = (f(ratio, border, diagonal, y_bar) for f in (_twice, _each))
+    z = Edge(*(2 * q + 2 * t for q, t in zip(z_bar, twice, strict=True)))
+    y = Edge(*(2 * p - 2 * h * e + h * h * q for p, e, q in zip(y_bar, each, z, strict=True)))
+    return z, y
+
+
+def undo_start(
+    inner: Action,
+    by_a: Action,
+    by_fraction: Action,
+    square: Float[Array, "*batch"],
+    d: float,
+    y_bar: Bordered,
+    z_bar: Bordered,
+) -> tuple[Bordered, Bordered]:
+    """Cotangents of A and of B^-1 over h from P and Q, by V, U, W and the start's d."""
+    u, w = side(by_a, y_bar), side(by_fraction, y_bar)
+    mixed = _mixed_core(u, w, by_a.border, by_fraction.border, by_fraction.core, y_bar.corner)
+    z_core = _start_z_core(square, z_bar.core, u.core, y_bar.border, by_a.border, mixed)
+    z_edge, p_edge = _start_z_edge(
+        square, u[1:], w[1:], by_a.ratio, by_fraction.ratio, edge(y_bar), edge(z_bar)
+    )
+    z = Bordered(z_core, *z_edge)
+    v = side(inner, z)
+    twice = _twice_core(v.core, v.border, inner.border, z.corner, inner.core)
+    a_core, p_core = _start_cores(
+        square,
+        d,
+        y_bar.core,
+        y_bar.border,
+        w.core,
+        by_fraction.border,
+        z.core,
+        z.border,
+        v.core,
+        inner.border,
+        twice,
+        z_bar.core,
+        mixed,
+    )
+    a_edge, p_edge = _start_edges(
+        square, d, edge(y_bar), w[1:], by_fraction.ratio, edge(z), v[1:], inner.ratio, p_edge
+    )
+    return Bordered(a_core, *a_edge), Bordered(p_core, *p_edge)
+
+
+@fenced
+def _mixed_core(u, w, sent_u, sent_w, left_w, corner):
+    nodes = product(u.core, transpose(left_w))
+    from_u = u.border - 0.5 * corner * sent_u[:, ::-1]
+    from_w = w.border - 0.5 * corner * sent_w[:, ::-1]
+    rows = product(from_u, transpose(sent_w)) + product(from_w, transpose(sent_u))
+    return nodes + 0.5 * rows
+
+
+@fenced
+def _start_z_core(square, z_core, u, border, sent, mixed):
+    one_side = u + 0.5 * product(border, transpose(sent))
+    return z_core + symmetric(square * mixed - one_side)
+
+
+@fenced
+def _start_z_edge(square, u, w, ratio_u, ratio_w, y_bar, z_bar):
+    border, diagonal = (0.5 * (x * ratio_w + y * ratio_u) for x, y in zip(u, w, strict=True))
+    mixed = Edge(
+        border,
+        diagonal,
+        0.5 * (ratio_u[1:] * ratio_w[:1] + ratio_w[1:] * ratio_u[:1]) * y_bar.corner,
+    )
+    each = _each(ratio_u, u[0], u[1], y_bar)
+    p = Edge(*(q + square * m for q, m in zip(z_bar, mixed, strict=True)))
+    return Edge(*(x - 0.5 * e for x, e in zip(p, each, strict=True))), p
+
+
+@fenced
+def _twice_core(core, border, sent, corner, left):
+    return both_sides(core, border, sent, corner, left)
+
+
+@fenced
+def _start_cores(square, d, y, y_border, w, sent_w, z, z_border, v, sent_v, twice, z_bar, mixed):
+    one_w = w + 0.5 * product(y_border, transpose(sent_w))
+    each_v = 2 * v + product(z_border, transpose(sent_v))
+    quartic = square * square
+    a = y + square * (z / 3 - one_w) - quartic / 9 * (each_v - d * square * twice)
+    return a, z_bar + square * mixed + (5 / 9) * quartic * twice
+
+
+@fenced
+def _start_edges(square, d, y_bar, w, ratio_w, z, v, ratio_v, p_edge):
+    each_w, each_v = _each(ratio_w, w[0], w[1], y_bar), _each(ratio_v, v[0], v[1], z)
+    twice = _twice(ratio_v, v[0], v[1], z)
+    quartic = square * square
+    a = (
+        y + square * (x / 3 - 0.5 * ew) - quartic / 9 * (ev - d * square * t)
+        for y, x, ew, ev, t in zip(y_bar, z, each_w, each_v, twice, strict=True)
+    )
+    return Edge(*a), Edge(*(p + (5 / 9) * quartic * t for p, t in zip(p_edge, twice, strict=True)))
+
+
+def undo_inverse(p: Bordered, p_bar: Bordered) -> Bordered:
+    """Cotangent of a matrix from that of its inverse p."""
+    core, border = _inverse_side(p.core, p.border, p_bar.core, p_bar.border, p_bar.corner)
+    return Bordered(
+        _minus_twice_core(core, border, p.border, p_bar.corner, p.core),
+        *_inverse_edge(edge(p), border, edge(p_bar)),
+    )
+
+
+@fenced
+def _inverse_side(left, sent, core, border, corner):
+    return product(left, core), product(left, border) + sent[:, ::-1] * corner
+
+
+@fenced
+def _minus_twice_core(core, border, sent, corner, left):
+    return -both_sides(core, border, sent, corner, left)
+
+
+@fenced
+def _inverse_edge(p, border, p_bar):
+    diagonal = total(p.border * p_bar.border) + p.corner * p_bar.corner
+    diagonal = diagonal + p.diagonal * p_bar.diagonal
+    return tuple(-x for x in _twice(p.diagonal, border, diagonal, p_bar))
+
+
+class MatrixSlopes(NamedTuple):
+    """Slopes over h in what one matrix is made of, and its part of the slope in h."""
+
+    moments: Float[Array, "degree *batch"]
+    beams: Float[Array, "2 degree *batch"]
+    secants: Float[Array, "2 *batch"]
+    h: Float[Array, "*batch"]
+
+
+def undo_matrix(
+    kernels: ModeKernels,
+    moments: Float[Array, "degree *batch"],
+    secants: Float[Array, "2 *batch"],
+    bar: Bordered,
+    single_scattering: bool,
+    coalbedo: Float[Array, "*batch"] | None = None,
+) -> tuple[MatrixSlopes, Float[Array, "*batch"] | None]:
+    """Pull-back of `layer_matrix`, and of `conservative` where there is a co-albedo.
+
+    The matrix is linear in moments, secants and the constant or co-albedo on its diagonal: the
+    products of these with their own slopes add up to its product with its cotangent.
+    """
+    core, own, rest = _undo_diagonal(bar.core, coalbedo)
+    pairs, nodes = _on_pairs(kernels.pairs, core), _on_nodes(kernels.nodes, bar.border)
+    corner = bar.corner if single_scattering else None
+    slopes = _undo_products(
+        pairs, nodes, kernels.beams, moments, secants, bar.diagonal, corner, rest
+    )
+    return slopes, own
+
+
+def _undo_diagonal(core, coalbedo):
+    mu, weight = double_gauss(2 * core.shape[0])
+    expand = (-1,) + (1,) * (core.ndim - 2)
+    inverse_mu = np.asarray(1 / mu, core.dtype).reshape(expand)
+
+    @fenced
+    def plain(core):
+        return total([inverse_mu[i] * core[i, i] for i in range(core.shape[0])])
+
+    if coalbedo is None:
+        return core, None, plain(core)
+    s = np.sqrt(weight * mu)
+    ratio = np.asarray(s[None] / s[:, None], core.dtype).reshape(mu.size, *expand)
+    eye = np.eye(mu.size, dtype=bool).reshape(mu.size, *expand)
+
+    @fenced
+    def kept(core, coalbedo):
+        diagonal = jnp.stack([core[i, i] for i in range(core.shape[0])])
+        own = total(inverse_mu * diagonal)
+        others = core - diagonal[:, None] * ratio
+        return jnp.where(eye, 0, others), own, coalbedo * own
+
+    return kept(core, coalbedo)
+
+
+@fenced
+def _on_pairs(pairs, core):
+    n = core.shape[0]
+    expand = (slice(None),) + (None,) * (core.ndim - 2)
+    return total(
+        [
+            pairs[i, j][expand] * (core[i, i] if i == j else core[i, j] + core[j, i])
+            for i in range(n)
+            for j in range(i + 1)
+        ]
+    )
+
+
+@fenced
+def _on_nodes(nodes, border):
+    expand = (None, slice(None)) + (None,) * (border.ndim - 2)
+    return total([nodes[i][expand] * border[i][:, None] for i in range(nodes.shape[0])])
+
+
+@fenced
+def _undo_products(core, nodes, beams, moments, secants, diagonal, corner, rest):
+    slope = core + total(beams * nodes)
+    to_beams = nodes
+    if corner is not None:
+        slope = slope + corner * beams[0] * beams[1]
+        to_beams = to_beams + corner * beams[::-1]
+    h = rest + total(secants * diagonal) - total(moments * slope)
+    return MatrixSlopes(-slope, -moments * to_beams, diagonal, h)

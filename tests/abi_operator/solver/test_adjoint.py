@@ -1,0 +1,197 @@
+"""The written-out derivative of the modes against reverse mode through their plain program."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from surfaces import Bowl
+
+from abi_operator.solver.adjoint import ModeSum, mode_sum, reflectance_and_gradient
+from abi_operator.solver.azimuth import (
+    Directions,
+    azimuthal_mean,
+    higher_modes,
+    legendre_tables,
+    weighted_moments,
+)
+from abi_operator.solver.delta_m import ScaledLayers
+from abi_operator.solver.ground import lambertian, reflecting
+
+# Both ways sum some 1e4 products, in different orders; relative to a column's largest slope.
+AGREE = 1e-11
+# Central differences of step h err by h^2 / 6 times a third derivative and by rounding / h.
+STEP, DIFFERENCES_AGREE = 1e-5, 1e-6
+
+
+def columns(num_streams, batch=4, num_layers=4, dtype=float):
+    """Random layers, one of them empty, under a sun whose secant differs by layer."""
+    rng = np.random.default_rng(num_streams)
+    tau = 10 ** rng.uniform(-3, 1.5, (num_layers, batch))
+    tau[1] = 0
+    ssa = rng.uniform(0.5, 1, (num_layers, batch))
+    g = rng.uniform(0.2, 0.85, (num_layers, 1, batch))
+    cosines = rng.uniform(0.2, 0.95, (2, batch))
+    values = {
+        "tau": tau,
+        "ssa": ssa,
+        "coalbedo": 1 - ssa,
+        "moments": g ** np.arange(num_streams)[:, None],
+        "cosines": cosines,
+        "sun_secants": rng.uniform(0.9, 1.1, tau.shape) / cosines[0],
+        "ground": rng.uniform(0.1, 0.8, batch),
+        "azimuth": rng.uniform(0.1, 3, batch),
+    }
+    return {name: jnp.asarray(value, dtype) for name, value in values.items()}
+
+
+def grounds(x, num_streams, general):
+    if not general:
+        return lambertian(x["ground"], x["cosines"], num_streams), None
+    surface = Bowl(x["ground"], 0.5 * jnp.ones_like(x["ground"]))
+    every = [reflecting(surface, m, x["cosines"], num_streams) for m in range(num_streams)]
+    return every[0], jax.tree.map(lambda *parts: jnp.stack(parts), *every[1:])
+
+
+def scaled(x):
+    return ScaledLayers(x["tau"], x["ssa"], x["coalbedo"], x["moments"], x["ssa"])
+
+
+def plain(x, num_streams, general, **how):
+    """Sum over the modes by the program that has no derivative of its own."""
+    tables = legendre_tables(num_streams, num_streams, x["cosines"])
+    shared = scaled(x), tables, Directions(x["cosines"], x["sun_secants"])
+    mean, others = grounds(x, num_streams, general)
+    total = azimuthal_mean(*shared, mean, **how).reflection()
+    return (total + higher_modes(*shared, others, x["azimuth"][None], **how))[0]
+
+
+def as_modes(x, num_streams, general):
+    """The same problem as the modes see it."""
+    even, odd = weighted_moments(scaled(x))
+    m = jnp.arange(num_streams, dtype=x["tau"].dtype)[:, None]
+    sign = jnp.where(m == 0, 1, 2 * (-1) ** m)
+    tables = legendre_tables(num_streams, num_streams, x["cosines"])
+    return ModeSum(
+        tau=x["tau"],
+        coalbedo=x["coalbedo"],
+        sun_secants=x["sun_secants"],
+        view_secant=1 / x["cosines"][1],
+        moments=(even, odd),
+        beams=tables.beams,
+        **dict(zip(("ground", "grounds"), grounds(x, num_streams, general), strict=True)),
+        weights=sign * jnp.cos(m * x["azimuth"]),
+    )
+
+
+def summed(x, num_streams, general, *, num_doublings, single_scattering):
+    return mode_sum(as_modes(x, num_streams, general), num_doublings, single_scattering)
+
+
+def value_and_slopes(function, x, *args, **how):
+    def run(x):
+        value, pull_back = jax.vjp(lambda x: function(x, *args, **how), x)
+        return value, pull_back(jnp.ones_like(value))[0]
+
+    return jax.jit(run)(x)
+
+
+@pytest.mark.parametrize(
+    ("num_streams", "num_doublings", "single_scattering", "general"),
+    [
+        (2, 0, True, False),
+        (2, 3, False, True),
+        (4, 3, True, True),
+        (6, 1, False, False),
+        pytest.param(4, 0, False, False, marks=pytest.mark.slow),
+        pytest.param(8, 3, True, False, marks=pytest.mark.slow),
+        pytest.param(8, 1, False, True, marks=pytest.mark.slow),
+    ],
+)
+def test_equals_reverse_mode(num_streams, num_doublings, single_scattering, general):
+    x = columns(num_streams)
+    how = {"num_doublings": num_doublings, "single_scattering": single_scattering}
+    expected, slopes = value_and_slopes(plain, x, num_streams, general, **how)
+    value, ours = value_and_slopes(summed, x, num_streams, general, **how)
+    np.testing.assert_allclose(value, expected, rtol=AGREE)
+    largest = np.max(
+        [np.abs(s).reshape(-1, s.shape[-1]).max(axis=0) for s in slopes.values()], axis=0
+    )
+    for name, slope in slopes.items():
+        error = np.abs(ours[name] - slope) / largest
+        assert error.max() < AGREE, name
+
+
+def test_value_and_gradient_come_together():
+    """The gradient's pass up gives the value, and the gradient has the inputs' structure."""
+    inputs = as_modes(columns(4), 4, general=True)
+    value, gradient = jax.jit(reflectance_and_gradient, static_argnums=(1, 2))(inputs, 2, False)
+    np.testing.assert_allclose(value, mode_sum(inputs, 2, False), rtol=AGREE)
+    assert jax.tree.map(jnp.shape, gradient) == jax.tree.map(jnp.shape, inputs)
+
+
+def test_one_mode_alone():
+    inputs = as_modes(columns(4), 4, general=False)
+    beams = tuple(table[:1] for table in inputs.beams)
+    inputs = inputs._replace(beams=beams, weights=inputs.weights[:1])
+    value, gradient = reflectance_and_gradient(inputs, 1, True)
+    np.testing.assert_allclose(value, mode_sum(inputs, 1, True), rtol=AGREE)
+    np.testing.assert_allclose(gradient.weights[0] * inputs.weights[0], value, rtol=AGREE)
+
+
+def test_constants_cost_nothing():
+    """A tangent in the thickness alone leaves no slope of the moments in the program."""
+    inputs = as_modes(columns(2), 2, general=False)
+
+    def of_thickness(tau):
+        return mode_sum(inputs._replace(tau=tau), 1, False)
+
+    tangent = jnp.ones_like(inputs.tau)
+    change = jax.jvp(of_thickness, (inputs.tau,), (tangent,))[1]
+    slopes = reflectance_and_gradient(inputs, 1, False)[1]
+    np.testing.assert_allclose(change, jnp.sum(slopes.tau, axis=0), rtol=AGREE)
+
+
+@pytest.mark.parametrize("order", ["forward", "reverse"])
+def test_second_derivatives(order):
+    """Change of the gradient along a direction in all inputs, against its differences."""
+    x = columns(2, batch=2, num_layers=2)
+    x["tau"] = jnp.asarray([[0.3, 1.0], [0.1, 0.7]])
+    rng = np.random.default_rng(0)
+    direction = {name: jnp.asarray(rng.normal(size=v.shape)) * 0.1 for name, v in x.items()}
+    how = {"num_doublings": 1, "single_scattering": True}
+
+    def gradient(x):
+        return jax.grad(lambda x: jnp.sum(summed(x, 2, False, **how)))(x)
+
+    def along(x):
+        slopes = gradient(x)
+        return sum(jnp.sum(slopes[name] * direction[name]) for name in x)
+
+    def moved(step):
+        return jax.tree.map(lambda v, d: v + step * d, x, direction)
+
+    if order == "forward":
+        second = jax.jit(lambda x: jax.jvp(gradient, (x,), (direction,))[1])(x)
+    else:
+        second = jax.jit(jax.grad(along))(x)
+    ahead, behind = jax.jit(gradient)(moved(STEP)), jax.jit(gradient)(moved(-STEP))
+    for name in x:
+        difference = (ahead[name] - behind[name]) / (2 * STEP)
+        scale = np.abs(difference).max() + 1
+        np.testing.assert_allclose(
+            second[name], difference, atol=DIFFERENCES_AGREE * scale, err_msg=name
+        )
+
+
+def test_single_precision():
+    """Finite everywhere, empty layers included, and as accurate as the type allows."""
+    how = {"num_doublings": 3, "single_scattering": False}
+    x = columns(4)
+    _, expected = value_and_slopes(summed, x, 4, False, **how)
+    single = {name: value.astype(jnp.float32) for name, value in x.items()}
+    value, slopes = value_and_slopes(summed, single, 4, False, **how)
+    assert value.dtype == jnp.float32
+    for name, slope in slopes.items():
+        assert slope.dtype == jnp.float32
+        assert np.isfinite(slope).all(), name
+        np.testing.assert_allclose(slope, expected[name], atol=3e-4 * np.abs(expected[name]).max())
