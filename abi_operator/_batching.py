@@ -40,7 +40,7 @@ def tile_size(num_streams: int) -> int:
     """Columns that are solved together, at most."""
     if jax.default_backend() != "cpu":
         return _GPU_TILE
-    return 256 if num_streams <= 4 else 128 if num_streams <= 8 else 64 if num_streams <= 16 else 16
+    return 256 if num_streams <= 4 else 128 if num_streams <= 8 else 64 if num_streams <= 16 else 32
 
 
 def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
