@@ -1,16 +1,8 @@
 """Which layout runs at which size.
 
 Kernels have their batch last and work on one tile of columns at a time, small enough that the
-matrices of a layer stay in the cache and large enough to fill the vector units. Microseconds per
-layer and azimuth mode of the value, float64, one core (`benchmarks/layout.py`):
-
-======= ==== ==== ==== ==== ==== ========
-streams   16   32   64  128  256 no tiles
-======= ==== ==== ==== ==== ==== ========
-4       0.81 0.44 0.29 0.22 0.19     0.19
-8       1.64 0.79 0.63 0.53 0.63     0.89
-16      3.58 3.11 2.80 2.78 4.33     5.79
-======= ==== ==== ==== ==== ==== ========
+matrices of a layer stay in the cache and large enough to fill the vector units
+(`benchmarks/layout.py` measures it).
 
 XLA runs the loop over tiles on one core: its loops share their temporary memory and so follow each
 other, however a program is written. It does run several CPU devices at a time, and where JAX has

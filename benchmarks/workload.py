@@ -22,7 +22,7 @@ from abi_operator.solver import (
 
 MAX_TAU, MIN_MU, MAX_MU = 30.0, 0.2, 0.95
 MOST_STREAMS = 64
-NUM_DOUBLINGS = 2  # right to 1e-5 up to MAX_TAU, see `layer.half_layer`
+NUM_DOUBLINGS = 2  # see `layer.start_coefficient`
 NODE_DISTANCE = 5e-4  # relative; CDISORT refuses a sun within 1e-4 of one of its own directions
 NUM_STATES, NUM_BANDS, NUM_VIEWS = 10, 3, 3
 

@@ -113,8 +113,8 @@ def start_coefficient(num_doublings: int) -> float:
     The start agrees with :math:`\sqrt x\coth\sqrt x` to the second order for any d. From four
     doublings on d = 10/21, the continued fraction, right to one order more. Below, d = 11/30 keeps
     the start near 1 up to larger x, so that doubling, which pulls everything there to 1, settles
-    one or two steps earlier: two doublings are right to 1e-5 of the reflectance for thin layers
-    and one of tau = 30, at 4 to 32 streams.
+    one or two steps earlier: for layers up to tau = 3 and one of 30, two doublings are right to
+    5e-6 of the reflectance at 4 and 8 streams and to 3e-5 at 16 (`benchmarks/solver.py`).
     """
     return 11 / 30 if num_doublings <= 3 else 10 / 21
 

@@ -1,0 +1,102 @@
+"""How near the machine's limits the solver works.
+
+    python benchmarks/roofline.py [--streams 4 8 16 32] [--columns 1000]
+
+counts the multiply-adds of the value, times it on the columns of `solver.py`, and sets its rate
+beside two of the same cores in the same run: a large matrix product (all that the processor can
+do), and nothing but products of the solver's own small matrices, by its own kernel, one tile of
+columns a core (all that this layout can do). Float64; one CPU device of JAX for each core that the
+command may use.
+"""
+
+import argparse
+import platform
+import time
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import workload
+from rounds import table
+
+from abi_operator._batching import tile_size
+from abi_operator._numerics import matmul
+
+LAYERS = 20
+
+
+def multiply_adds(num_streams, num_layers, num_doublings):
+    """Of one column with one view, all modes, in matrices and their two borders."""
+    n = num_streams // 2
+    kernels = 2 * n * n * n + 2 * 2 * n * n
+    inverse = n**3
+    product = inverse + 2 * n * n * (n + 2)  # and every core is symmetric: half could be spared
+    sums = (4 + 2 * num_doublings) * n * (n + 2)
+    layer = kernels + inverse + (2 + num_doublings + 1) * product + sums
+    return num_streams * num_layers * layer
+
+
+def fastest(call, repeats=7):
+    """Seconds of the fastest of some calls, after one that compiles."""
+    jax.block_until_ready(call())
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        jax.block_until_ready(call())
+        seconds.append(time.perf_counter() - start)
+    return min(seconds)
+
+
+def arithmetic(cores):
+    """Multiply-adds per second of all cores, in a large matrix product."""
+    size = 2048
+    a = jnp.asarray(np.random.default_rng(0).normal(size=(cores, size, size)))
+    one = jax.jit(lambda x: x @ x)
+    devices = [jax.device_put(x, d) for x, d in zip(a, jax.local_devices(), strict=True)]
+    return cores * size**3 / fastest(lambda: [one(x) for x in devices])
+
+
+def small_products(num_streams, cores):
+    """Multiply-adds per second of all cores in products of cores, one tile after the other."""
+    n, tile, rounds = num_streams // 2, tile_size(num_streams), 1000
+    a = np.random.default_rng(0).uniform(0, 1 / n, (n, n, tile))
+    a = [jax.device_put(a, d) for d in jax.local_devices()]
+    one = jax.jit(lambda a: jax.lax.fori_loop(0, rounds, lambda _, x: matmul(a, x), a))
+    return cores * rounds * tile * n**3 / fastest(lambda: [one(x) for x in a])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--streams", type=int, nargs="+", default=[4, 8, 16, 32])
+    parser.add_argument("--columns", type=int, default=1000)
+    options = parser.parse_args()
+    cores = workload.use_all_cores()
+    highest = arithmetic(cores)
+    print(f"jax {jax.__version__}, {platform.machine()}, {cores} cores, float64, {LAYERS} layers")
+    print(f"A large matrix product: {highest / 1e9:.1f} 10^9 multiply-adds per second.\n")
+    rows = []
+    for n in options.streams:
+        given = workload.columns(options.columns, LAYERS, seed=1)
+        arrays = workload.arguments(given, n)
+        doublings = workload.NUM_DOUBLINGS
+        program = workload.value({"num_streams": n, "num_doublings": doublings})
+        seconds = fastest(lambda program=program, arrays=arrays: program(*arrays))
+        work = multiply_adds(n, LAYERS, doublings)
+        rate = work * options.columns / seconds
+        rows.append(
+            [
+                n,
+                doublings,
+                f"{work:,}",
+                f"{seconds / options.columns * 1e6:.1f}",
+                f"{rate / 1e9:.1f}",
+                f"{rate / highest:.0%}",
+                f"{rate / small_products(n, cores):.0%}",
+            ]
+        )
+    head = ["streams", "doublings", "multiply-adds a column", "microseconds", "10^9 a second"]
+    table([*head, "of a large product", "of small products"], rows)
+
+
+if __name__ == "__main__":
+    main()
