@@ -114,7 +114,7 @@ def start_coefficient(num_doublings: int) -> float:
     doublings on d = 10/21, the continued fraction, right to one order more. Below, d = 11/30 keeps
     the start near 1 up to larger x, so that doubling, which pulls everything there to 1, settles
     one or two steps earlier: for layers up to tau = 3 and one of 30, two doublings are right to
-    5e-6 of the reflectance at 4 and 8 streams and to 3e-5 at 16 (`benchmarks/solver.py`).
+    6e-6 of the reflectance at 4 and 8 streams and to 3e-5 at 16 (`benchmarks/solver.py`).
     """
     return 11 / 30 if num_doublings <= 3 else 10 / 21
 
