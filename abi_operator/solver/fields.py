@@ -158,12 +158,13 @@ class Side(NamedTuple):
 
 def side(quotient: Action, x: Bordered) -> Side:
     """Apply a quotient to one side of a cotangent."""
-    core, border = _side_of_nodes(quotient.core, quotient.border, x.core, x.border, x.corner)
+    core, border = side_of_nodes(quotient.core, quotient.border, x.core, x.border, x.corner)
     return Side(core, border, _side_of_beams(*quotient[2:], x.border, x.diagonal, x.corner, border))
 
 
 @fenced
-def _side_of_nodes(left, sent, core, border, corner):
+def side_of_nodes(left, sent, core, border, corner):
+    """Core and border of a cotangent with a matrix on one side."""
     return product(left, core), product(left, border) + _other(sent) * corner
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from .._numerics import fenced, product, transpose
 from .bordered import Bordered
-from .fields import Action, Edge, both_sides, edge, side, symmetric, total
+from .fields import Action, Edge, both_sides, edge, side, side_of_nodes, symmetric, total
 from .layer import ModeKernels
 from .quadrature import double_gauss
 
@@ -132,9 +132,7 @@ def _start_z_edge(square, u, w, ratio_u, ratio_w, y_bar, z_bar):
     return Edge(*(x - 0.5 * e for x, e in zip(p, each, strict=True))), p
 
 
-@fenced
-def _twice_core(core, border, sent, corner, left):
-    return both_sides(core, border, sent, corner, left)
+_twice_core = fenced(both_sides)
 
 
 @fenced
@@ -160,16 +158,11 @@ def _start_edges(square, d, y_bar, w, ratio_w, z, v, ratio_v, p_edge):
 
 def undo_inverse(p: Bordered, p_bar: Bordered) -> Bordered:
     """Cotangent of a matrix from that of its inverse p."""
-    core, border = _inverse_side(p.core, p.border, p_bar.core, p_bar.border, p_bar.corner)
+    core, border = side_of_nodes(p.core, p.border, p_bar.core, p_bar.border, p_bar.corner)
     return Bordered(
         _minus_twice_core(core, border, p.border, p_bar.corner, p.core),
         *_inverse_edge(edge(p), border, edge(p_bar)),
     )
-
-
-@fenced
-def _inverse_side(left, sent, core, border, corner):
-    return product(left, core), product(left, border) + sent[:, ::-1] * corner
 
 
 @fenced
