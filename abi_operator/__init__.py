@@ -13,6 +13,7 @@ from .atmosphere import LiquidCloud as LiquidCloud
 from .atmosphere import Plume as Plume
 from .atmosphere import State as State
 from .bands import BANDS as BANDS
+from .bands import GRASSO2013 as GRASSO2013
 from .geometry import Geometry as Geometry
 from .optics import ash as ash
 from .optics import smoke as smoke

@@ -13,7 +13,7 @@ class Band(NamedTuple):
     """One band: its name in ABI files and the centroid of its response. [um]
 
     Centroids are those of GOES-16's spectral response [1]_ weighted by the solar spectrum; those
-    of GOES-17 to -19 differ by 1.4 nm or less in the bands listed here.
+    of GOES-17 to -19 differ by 1.4 nm or less, but by 6 nm in C04 and by 14 nm in C07.
 
     References
     ----------
@@ -24,10 +24,23 @@ class Band(NamedTuple):
     wavelength_um: float
 
 
+# "green" is the band that the imager lacks, monochromatic light of 0.555 um.
 BANDS: dict[str, Band] = {
     band.name: band
-    for band in (Band("C01", 0.4711), Band("C02", 0.6396), Band("C03", 0.8644), Band("C06", 2.2427))
+    for band in (
+        Band("C01", 0.4711),
+        Band("green", 0.555),
+        Band("C02", 0.6396),
+        Band("C03", 0.8644),
+        Band("C04", 1.3732),
+        Band("C05", 1.6095),
+        Band("C06", 2.2427),
+        Band("C07", 3.8934),
+    )
 }
+
+GRASSO2013 = ("C01", "C02", "C03", "C06")
+"""The reflective bands of Grasso et al. (2013): those simulated where nothing else is asked for."""
 
 
 def check_bands(bands: Sequence[str]) -> tuple[str, ...]:

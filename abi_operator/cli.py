@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import jax
 import typer
 
-from .bands import BANDS, check_bands
+from .bands import GRASSO2013, check_bands
 from .commands import one_sentence
 from .demo import write_demo
 from .files import output_folder
@@ -68,7 +68,7 @@ def simulate(
     satellite_longitude: Annotated[
         float, typer.Option(min=-180, max=360, help="In degrees, east positive.")
     ] = GOES_EAST,
-    bands: Annotated[str, typer.Option(help="Bands to simulate.")] = ",".join(BANDS),
+    bands: Annotated[str, typer.Option(help="Bands to simulate.")] = ",".join(GRASSO2013),
     broadband: Annotated[
         bool, typer.Option(help="Let broadband albedo stand in for missing spectral bands.")
     ] = False,

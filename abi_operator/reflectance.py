@@ -14,14 +14,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .atmosphere import State
-from .bands import BANDS, check_bands
+from .bands import BANDS, GRASSO2013, check_bands
 from .optics import column_optics
 from .solver import cos_scattering_angle, toa_brf
 
 
 def brf(
     state: State,
-    bands: Sequence[str] = tuple(BANDS),
+    bands: Sequence[str] = GRASSO2013,
     *,
     num_streams: int = 8,
     num_modes: int | None = None,
@@ -72,7 +72,7 @@ def brf(
 
 def reflectance_factor(
     state: State,
-    bands: Sequence[str] = tuple(BANDS),
+    bands: Sequence[str] = GRASSO2013,
     *,
     num_streams: int = 8,
     num_modes: int | None = None,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from .bands import BANDS
+from .bands import GRASSO2013
 from .files import (
     ResultWriter,
     read_mcd43a1,
@@ -81,7 +81,7 @@ class Request(NamedTuple):
     plume_species: Species = Species.SMOKE
     plume_aod: float = 2.0
     satellite_longitude: float = GOES_EAST
-    bands: tuple[str, ...] = tuple(BANDS)
+    bands: tuple[str, ...] = GRASSO2013
     broadband: bool = False
     num_streams: int = 8
 

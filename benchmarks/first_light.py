@@ -21,7 +21,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from abi_operator import BANDS, __version__, brf, smoke
+from abi_operator import BANDS, GRASSO2013, __version__, brf, smoke
 from abi_operator.demo import write_demo
 from abi_operator.files import ResultWriter, read_mcd43a1, read_plume, read_wrf, wrf_coordinates
 from abi_operator.optics import column_optics
@@ -41,7 +41,7 @@ def read(inputs):
     plume = PlumeSpecification(smoke(2.0), read_plume(inputs.plume, shape))
     return scenario(
         read_wrf(inputs.wrf, 0),
-        albedo=read_mcd43a1(inputs.albedo, tuple(BANDS)),
+        albedo=read_mcd43a1(inputs.albedo, GRASSO2013),
         ocean_albedo=OCEAN_ALBEDO,
         plumes={"smoke": plume},
     )
@@ -54,7 +54,9 @@ def optics(states, num_moments):
     def column(state):
         geometry = state.geometry
         angle = cos_scattering_angle(geometry.mu0, geometry.mu, geometry.relative_azimuth)
-        layers = [column_optics(state.atmosphere, band) for band in BANDS.values()]
+        layers = [
+            column_optics(state.atmosphere, band) for band in (BANDS[name] for name in GRASSO2013)
+        ]
         arrays = [
             (x.tau[0], x.ssa[0], x.moments(num_moments), x.phase_function(angle)) for x in layers
         ]
@@ -66,7 +68,7 @@ def optics(states, num_moments):
 def solve(states, layers, num_streams):
     """Layers to brf."""
     tau, ssa, moments, phase = layers
-    albedo = np.stack([states.albedo[name] for name in BANDS], axis=1)
+    albedo = np.stack([states.albedo[name] for name in GRASSO2013], axis=1)
     geometry = states.geometry
     directions = [
         np.asarray(x)[:, None] for x in (geometry.mu0, geometry.mu, geometry.relative_azimuth)
@@ -108,7 +110,7 @@ def main():
         inputs = write_demo(folder, size=options.size)
         rows = {}
         *rows["reading"], scene = timed(lambda: read(inputs), options.repeats)
-        states = column_states(scene, tuple(BANDS))
+        states = column_states(scene, GRASSO2013)
         moments = options.num_streams + 1
         *rows["optics"], layers = timed(lambda: optics(states, moments), options.repeats)
         *rows["solving"], values = timed(
@@ -127,7 +129,8 @@ def main():
     )
     print(f"{platform.machine()}, {os.cpu_count()} cores, Python {sys.version.split()[0]}, float64")
     print(
-        f"{options.size} x {options.size} columns x {len(BANDS)} bands, {layers_count} layers, ",
+        f"{options.size} x {options.size} columns x {len(GRASSO2013)} bands, ",
+        f"{layers_count} layers, ",
         end="",
     )
     print(f"{options.num_streams} streams\n")
@@ -142,7 +145,7 @@ def main():
     print(f"| all | | {whole:.3f} | | | {count / whole:,.0f} |\n")
     print(
         f"error of brf at {options.num_streams} streams against {REFERENCE_STREAMS} on "
-        f"{REFERENCE_COLUMNS} columns x {len(BANDS)} bands, relative to max(brf, 0.01): "
+        f"{REFERENCE_COLUMNS} columns x {len(GRASSO2013)} bands, relative to max(brf, 0.01): "
         f"median {np.median(error):.1e}, p99 {np.percentile(error, 99):.1e}, max {error.max():.1e}"
     )
 

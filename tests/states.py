@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from abi_operator import BANDS, Atmosphere, Geometry, LiquidCloud, State, ash, smoke
+from abi_operator import GRASSO2013, Atmosphere, Geometry, LiquidCloud, State, ash, smoke
 
 
 def column(liquid=0.05, smoke_aod=0.8, ash_aod=0.0, albedo=0.1, num_layers=12):
@@ -17,6 +17,6 @@ def column(liquid=0.05, smoke_aod=0.8, ash_aod=0.0, albedo=0.1, num_layers=12):
     plumes = {"smoke": smoke(smoke_aod), "ash": ash(ash_aod)}
     return State(
         Atmosphere(jnp.asarray(pressure), jnp.asarray(height), LiquidCloud(mass, number), plumes),
-        {name: albedo for name in BANDS},
+        {name: albedo for name in GRASSO2013},
         Geometry(jnp.asarray(0.6), jnp.asarray(0.8), jnp.asarray(1.2)),
     )

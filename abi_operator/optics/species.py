@@ -10,7 +10,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array
 
 from ..atmosphere import Plume
-from ..bands import BANDS, check_bands
+from ..bands import GRASSO2013, check_bands
 from .aerosol_tables import ASH, SMOKE, AerosolOptics
 
 
@@ -20,7 +20,7 @@ def smoke(
     brightness: ArrayLike = 1.0,
     base: ArrayLike = 1000.0,
     top: ArrayLike = 3000.0,
-    bands: Sequence[str] = tuple(BANDS),
+    bands: Sequence[str] = GRASSO2013,
     relative_extinction: Mapping[str, ArrayLike] | None = None,
     ssa: Mapping[str, ArrayLike] | None = None,
     asymmetry: Mapping[str, ArrayLike] | None = None,
@@ -67,7 +67,7 @@ def ash(
     brightness: ArrayLike = 1.0,
     base: ArrayLike = 8000.0,
     top: ArrayLike = 11000.0,
-    bands: Sequence[str] = tuple(BANDS),
+    bands: Sequence[str] = GRASSO2013,
     relative_extinction: Mapping[str, ArrayLike] | None = None,
     ssa: Mapping[str, ArrayLike] | None = None,
     asymmetry: Mapping[str, ArrayLike] | None = None,

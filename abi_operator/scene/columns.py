@@ -7,13 +7,13 @@ import numpy as np
 import xarray as xr
 
 from ..atmosphere import Atmosphere, LiquidCloud, Plume, State
-from ..bands import BANDS, check_bands
+from ..bands import GRASSO2013, check_bands
 from ..geometry import Geometry
 from ..nomenclature import PLUME
 from .species import species_of
 
 
-def column_states(scenario: xr.Dataset, bands: Sequence[str] = tuple(BANDS)) -> State:
+def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> State:
     """State of every column of a scenario, or of a result at one time.
 
     Parameters

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from ..bands import BANDS, check_bands
+from ..bands import GRASSO2013, check_bands
 from ..files.netcdf import cf_attributes
 from ..nomenclature import QUALITY_FLAGS, SCENARIO
 from .account import condensate_account, condensate_warnings, model_attributes, pressure_range
@@ -28,7 +28,7 @@ def scenario(
     ocean_albedo: float | None = None,
     plumes: Mapping[str, PlumeSpecification] | None = None,
     satellite_longitude: float = GOES_EAST,
-    bands: Sequence[str] = tuple(BANDS),
+    bands: Sequence[str] = GRASSO2013,
     droplet_number: DropletNumber | None = None,
     added_heights: Sequence[float] | None = None,
     rows: slice = slice(None),

@@ -6,7 +6,7 @@ import miepython
 import numpy as np
 import pytest
 
-from abi_operator.bands import BANDS
+from abi_operator.bands import BANDS, GRASSO2013
 from abi_operator.optics import ash, smoke
 from abi_operator.optics.aerosol_tables import ASH, SMOKE
 
@@ -48,7 +48,7 @@ def test_smoke_extinction_refers_to_550_nm():
 def test_optical_depth_and_defaults(build):
     plume = build(0.6, brightness=0.5)
     np.testing.assert_allclose(plume.aod_550, 0.3)
-    assert tuple(plume.ssa) == tuple(BANDS)
+    assert tuple(plume.ssa) == GRASSO2013
     assert all(leaf.shape == () for leaf in jax.tree.leaves(plume))
 
 
