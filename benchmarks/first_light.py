@@ -129,7 +129,7 @@ def main():
     )
     print(f"{platform.machine()}, {os.cpu_count()} cores, Python {sys.version.split()[0]}, float64")
     print(
-        f"{options.size} x {options.size} columns x {len(GRASSO2013)} bands, ",
+        f"{options.size} x {options.size} columns x {len(GRASSO2013)} bands, "
         f"{layers_count} layers, ",
         end="",
     )
