@@ -58,6 +58,74 @@ class Plume(eqx.Module):
         return self.brightness * self.extinction_550 * (self.top - self.base)
 
 
+class MiePlume(eqx.Module):
+    """A vertically uniform aerosol layer of spheres, lognormal in size, by its effective radius.
+
+    As a `Plume`, but extinction relative to 550 nm, single-scattering albedo and asymmetry factor
+    of every band follow from Mie theory, by the table of the species.
+
+    Parameters
+    ----------
+    base, top
+        Lower and upper edge above the ground. [m]
+    extinction_550
+        Extinction coefficient at 550 nm where brightness is 1. [m-1]
+    brightness
+        Horizontal weight, 0 to 1. [-]
+    effective_radius_um
+        Ratio of the third to the second moment of the size distribution, of radii. [um]
+    species
+        Name of the table: refractive index and width of the size distribution.
+    """
+
+    base: Float[Array, "*batch"]
+    top: Float[Array, "*batch"]
+    extinction_550: Float[Array, "*batch"]
+    brightness: Float[Array, "*batch"]
+    effective_radius_um: Float[Array, "*batch"]
+    species: str = eqx.field(static=True)
+
+    @property
+    def aod_550(self) -> Float[Array, "*batch"]:
+        """Optical depth of the plume at 550 nm. [-]"""
+        return self.brightness * self.extinction_550 * (self.top - self.base)
+
+
+class Hydrometeor(eqx.Module):
+    """Particles of one hydrometeor class in each layer, by mass and number.
+
+    Parameters
+    ----------
+    mass_path
+        Mass in the layer per horizontal area. [kg m-2]
+    number_path
+        Number of particles in the layer per horizontal area. [m-2]
+    """
+
+    mass_path: Float[Array, "*batch layer"]
+    number_path: Float[Array, "*batch layer"]
+
+
+class Gases(eqx.Module):
+    """Gases that absorb in the bands of the imager.
+
+    Parameters
+    ----------
+    vapour
+        Mass of water vapour in the layer per horizontal area. [kg m-2]
+    ozone
+        Ozone in the layer. [DU]
+    carbon_dioxide, methane, nitrous_oxide
+        Mole fractions in dry air, the same in all layers. [-]
+    """
+
+    vapour: Float[Array, "*batch layer"]
+    ozone: Float[Array, "*batch layer"]
+    carbon_dioxide: Float[Array, "*batch"]
+    methane: Float[Array, "*batch"]
+    nitrous_oxide: Float[Array, "*batch"]
+
+
 class Atmosphere(eqx.Module):
     """Air, cloud and plumes of one column.
 
@@ -70,12 +138,21 @@ class Atmosphere(eqx.Module):
         Cloud droplets in the layers between the levels.
     plumes
         Aerosol plumes by species name (``"smoke"``, ``"ash"``).
+    temperature
+        At the levels; None where neither gases nor emission are to be simulated. [K]
+    gases
+        Gases that absorb; None for air without them.
+    hydrometeors
+        Hydrometeor classes by name (``"rain"``, ``"snow"``), beside `liquid`.
     """
 
     pressure: Float[Array, "*batch level"]
     height: Float[Array, "*batch level"]
     liquid: LiquidCloud
-    plumes: dict[str, Plume]
+    plumes: dict[str, Plume | MiePlume]
+    temperature: Float[Array, "*batch level"] | None = None
+    gases: Gases | None = None
+    hydrometeors: dict[str, Hydrometeor] = eqx.field(default_factory=dict)
 
 
 class State(eqx.Module):
