@@ -9,13 +9,18 @@ on its own; `abi_operator.files` and `abi_operator.scene` turn model output on d
 
 from ._version import __version__ as __version__
 from .atmosphere import Atmosphere as Atmosphere
+from .atmosphere import Gases as Gases
+from .atmosphere import Hydrometeor as Hydrometeor
 from .atmosphere import LiquidCloud as LiquidCloud
+from .atmosphere import MiePlume as MiePlume
 from .atmosphere import Plume as Plume
 from .atmosphere import State as State
 from .bands import BANDS as BANDS
 from .bands import GRASSO2013 as GRASSO2013
 from .geometry import Geometry as Geometry
 from .optics import ash as ash
+from .optics import mie_plume as mie_plume
 from .optics import smoke as smoke
 from .reflectance import brf as brf
 from .reflectance import reflectance_factor as reflectance_factor
+from .standard_atmospheres import standard_atmosphere as standard_atmosphere

@@ -111,13 +111,26 @@ def weighted_sum(
     """Sum of arrays that all columns share, weighted column by column: ``*shape *batch``."""
     if weights.shape[0] > _WRITTEN_OUT:
         return jnp.tensordot(matrices, weights, axes=1)
-    return _weighted_sum(matrices, weights)
+    total = _weighted_sum(matrices[..., :_TERMS], weights[:_TERMS])
+    for k in range(_TERMS, weights.shape[0], _TERMS):
+        total = _add_weighted_sum(total, matrices[..., k : k + _TERMS], weights[k : k + _TERMS])
+    return total
+
+
+_TERMS = 4  # at a time: `_kernels.one_kernel` asks for little arithmetic in each
 
 
 @fenced
 def _weighted_sum(matrices, weights):
     expand = (...,) + (None,) * (weights.ndim - 1)
     return weighted([(matrices[..., k][expand], weights[k]) for k in range(weights.shape[0])])
+
+
+@fenced
+def _add_weighted_sum(total, matrices, weights):
+    expand = (...,) + (None,) * (weights.ndim - 1)
+    terms = [(matrices[..., k][expand], weights[k]) for k in range(weights.shape[0])]
+    return weighted([(1.0, total), *terms])
 
 
 def transpose(a: Float[Array, "row col *batch"]) -> Float[Array, "col row *batch"]:

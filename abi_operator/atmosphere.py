@@ -73,7 +73,8 @@ class MiePlume(eqx.Module):
     brightness
         Horizontal weight, 0 to 1. [-]
     effective_radius_um
-        Ratio of the third to the second moment of the size distribution, of radii. [um]
+        Ratio of the third to the second moment of the size distribution, of radii; of smoke, that
+        of its fine mode. [um]
     species
         Name of the table: refractive index and width of the size distribution.
     """

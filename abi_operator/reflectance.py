@@ -3,7 +3,8 @@
 The reflectance factor of ABI files is rho = pi d^2 L / E0, with L the radiance, E0 the band's solar
 irradiance at 1 AU and d the distance of the sun in AU. It contains the cosine of the solar zenith
 angle, rho = mu0 * brf, and depends on d and E0 no longer once L is the answer to that sunlight;
-`brf`, the bidirectional reflectance factor, is 1 for a white Lambertian ground without air.
+`brf`, the bidirectional reflectance factor, is 1 for a white Lambertian ground without air. Both
+are of sunlight alone: what the ground and the air emit in C07 is not in them.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from jaxtyping import Array, Float
 
 from .atmosphere import State
 from .bands import BANDS, GRASSO2013, check_bands
-from .optics import column_optics
+from .optics import ALL_GASES, column_optics
 from .solver import cos_scattering_angle, toa_brf
 
 
@@ -23,6 +24,7 @@ def brf(
     state: State,
     bands: Sequence[str] = GRASSO2013,
     *,
+    gases: Sequence[str] = ALL_GASES,
     num_streams: int = 8,
     num_modes: int | None = None,
     num_doublings: int | None = None,
@@ -39,6 +41,8 @@ def brf(
         satellite stand above the horizon.
     bands
         Names of the bands to simulate, each present in the state's albedo and plumes.
+    gases
+        Which of the atmosphere's gases absorb; ``()`` leaves them all out.
     num_streams, num_modes, num_doublings
         Accuracy and cost of the solver; see `solver.toa_brf`. Under a transformation, where the
         layers' optical depths cannot be read, `num_doublings` None takes enough for any cloud,
@@ -58,7 +62,7 @@ def brf(
         if name not in state.albedo:
             raise ValueError(f"state.albedo has no {name!r}; it holds {list(state.albedo)}.")
     state, batch = _uniform(state)
-    inputs = _jitted_inputs(state, bands, num_streams + 1)
+    inputs = _jitted_inputs(state, bands, tuple(gases), num_streams + 1)
     *layers, phase_function, weight = inputs
     terms = toa_brf(
         *layers,
@@ -74,6 +78,7 @@ def reflectance_factor(
     state: State,
     bands: Sequence[str] = GRASSO2013,
     *,
+    gases: Sequence[str] = ALL_GASES,
     num_streams: int = 8,
     num_modes: int | None = None,
     num_doublings: int | None = None,
@@ -85,6 +90,7 @@ def reflectance_factor(
     value = brf(
         state,
         bands,
+        gases=gases,
         num_streams=num_streams,
         num_modes=num_modes,
         num_doublings=num_doublings,
@@ -109,7 +115,9 @@ def _uniform(state: State) -> tuple[State, tuple[int, ...]]:
     return state, batch
 
 
-def _column_inputs(state: State, bands: tuple[str, ...], num_moments: int) -> tuple[Array, ...]:
+def _column_inputs(
+    state: State, bands: tuple[str, ...], gases: tuple[str, ...], num_moments: int
+) -> tuple[Array, ...]:
     """Solver inputs of one column, bands and their exponential terms on one leading axis.
 
     The last entry is the weight of each term in each band's sum, ``band term``.
@@ -119,7 +127,7 @@ def _column_inputs(state: State, bands: tuple[str, ...], num_moments: int) -> tu
     cosine = cos_scattering_angle(mu0, mu, relative_azimuth)
     tau, ssa, moments, albedo, phase, weights = [], [], [], [], [], []
     for name in bands:
-        layers = column_optics(state.atmosphere, BANDS[name])
+        layers = column_optics(state.atmosphere, BANDS[name], gases)
         terms = layers.weight.shape[0]
         tau.append(layers.tau)
         ssa.append(layers.ssa)
@@ -134,13 +142,15 @@ def _column_inputs(state: State, bands: tuple[str, ...], num_moments: int) -> tu
     return *stacked, *directions, jnp.concatenate(phase), weight
 
 
-def _batched_inputs(state: State, bands: tuple[str, ...], num_moments: int) -> tuple[Array, ...]:
+def _batched_inputs(
+    state: State, bands: tuple[str, ...], gases: tuple[str, ...], num_moments: int
+) -> tuple[Array, ...]:
     def function(column: State) -> tuple[Array, ...]:
-        return _column_inputs(column, bands, num_moments)
+        return _column_inputs(column, bands, gases, num_moments)
 
     for _ in state.geometry.solar_zenith.shape:
         function = jax.vmap(function)
     return function(state)
 
 
-_jitted_inputs = jax.jit(_batched_inputs, static_argnums=(1, 2))
+_jitted_inputs = jax.jit(_batched_inputs, static_argnums=(1, 2, 3))

@@ -217,8 +217,9 @@ def _view(buffers, name, num_layers):
     return array[: array.size - array.size % int(np.prod(shape))].reshape(-1, *shape)
 
 
-def _start(buffers):
-    """Runs once in every process. CDISORT prints warnings that no flag turns off."""
+def _start(buffers, cores):
+    """Runs once in every process, which keeps a core. CDISORT's warnings cannot be turned off."""
+    os.sched_setaffinity(0, {cores.get()})
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
@@ -259,7 +260,10 @@ class Peers:
         # Read when a process loads its linear algebra.
         os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         context = multiprocessing.get_context("spawn")
-        self.pool = context.Pool(num_processes, _start, (self.buffers,))
+        cores = context.Queue()
+        for core in sorted(os.sched_getaffinity(0))[:num_processes]:
+            cores.put(core)
+        self.pool = context.Pool(num_processes, _start, (self.buffers, cores))
         os.environ.clear()
         os.environ |= before
 

@@ -78,7 +78,7 @@ def main():
     for n in options.streams:
         given = workload.columns(options.columns, LAYERS, seed=1)
         arrays = workload.arguments(given, n)
-        doublings = workload.NUM_DOUBLINGS
+        doublings = workload.num_doublings(n)
         program = workload.value({"num_streams": n, "num_doublings": doublings})
         seconds = fastest(lambda program=program, arrays=arrays: program(*arrays))
         work = multiply_adds(n, LAYERS, doublings)

@@ -77,7 +77,7 @@ def agreement(peers, streams, bars):
             peers.put(given)
             peers.solve("sasktran2 + derivatives", n, 16)
             shared = workload.arguments(given.with_geometry_of_first(), n)[:7]
-            options = {"num_streams": n, "num_doublings": workload.NUM_DOUBLINGS}
+            options = {"num_streams": n, "num_doublings": workload.num_doublings(n)}
             plain = workload.gradient(options | {"single_scattering": None})
             slopes = plain(*shared)[1]
             ours = np.concatenate([slopes[0], slopes[1], slopes[3][:, None]], axis=1)
@@ -103,7 +103,7 @@ def main_table(rounds, options, bars):
         truth_one.append(rounds.peers.solve("one geometry", TRUE_STREAMS, few)[0])
     rows, notes = [], []
     for n in options.streams:
-        k, names = workload.NUM_DOUBLINGS, usable_peers(n)
+        k, names = workload.num_doublings(n), usable_peers(n)
         settings = {"num_streams": n, "num_doublings": k}
         programs = {
             "value": Program(workload.value(settings)),

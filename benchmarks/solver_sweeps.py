@@ -32,7 +32,7 @@ COPIES = 6
 
 
 def both(num_streams):
-    settings = {"num_streams": num_streams, "num_doublings": workload.NUM_DOUBLINGS}
+    settings = {"num_streams": num_streams, "num_doublings": workload.num_doublings(num_streams)}
     return {
         "value": Program(workload.value(settings)),
         "value + gradient": Program(workload.gradient(settings)),
@@ -44,7 +44,7 @@ def sweep(rounds: Rounds, label, cases, bars):
     found, rows = {}, []
     for case, n, layers, count, dtype in cases:
         t = rounds.run(both(n), n, layers, count, ["nanodisort"], dtype=dtype)
-        row, error = [case, workload.NUM_DOUBLINGS], {}
+        row, error = [case, workload.num_doublings(n)], {}
         for name in ("value", "value + gradient"):
             row += [digits(t[name].microseconds), t[name].spread]
             error[name] = apart(t[name].brf, t["nanodisort"].brf)
@@ -114,7 +114,7 @@ def derivatives(rounds, options, bars):
     """`jax.vmap` of the call for one column, several views, and retrievals' Jacobians."""
     count = options.columns - options.columns % workload.NUM_BANDS
     for n in options.sweep_streams or USUAL_STREAMS:
-        settings = {"num_streams": n, "num_doublings": workload.NUM_DOUBLINGS}
+        settings = {"num_streams": n, "num_doublings": workload.num_doublings(n)}
 
         def whole(given, _):
             return (given,)

@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -22,7 +23,6 @@ from abi_operator.solver import (
 
 MAX_TAU, MIN_MU, MAX_MU = 30.0, 0.2, 0.95
 MOST_STREAMS = 64
-NUM_DOUBLINGS = 2  # see `layer.start_coefficient`
 NODE_DISTANCE = 5e-4  # relative; CDISORT refuses a sun within 1e-4 of one of its own directions
 NUM_STATES, NUM_BANDS, NUM_VIEWS = 10, 3, 3
 
@@ -86,12 +86,28 @@ def henyey_greenstein(asymmetry, cosine):
     return (1 - asymmetry**2) / (1 + asymmetry**2 - 2 * asymmetry * cosine) ** 1.5
 
 
+def num_doublings(num_streams):
+    """For layers up to tau = 3 and one of 30, right to 1e-5; see `layer.start_coefficient`."""
+    return 2 if num_streams <= 8 else 3
+
+
 def use_all_cores():
-    """Float64, and a CPU device of JAX for each core that the command may use; their number."""
-    cores = len(os.sched_getaffinity(0))
+    """Float64, a CPU device of JAX for each core that the command may use, and full vectors.
+
+    Threads of XLA stay each on a core, as the processes of the other solvers do: after a pause
+    Linux often wakes two on one core, and takes longer to part them than a call lasts.
+    """
+    cores = sorted(os.sched_getaffinity(0))
+    flags = os.environ.get("XLA_FLAGS", "")
+    os.environ["XLA_FLAGS"] = f"--xla_cpu_prefer_vector_width=512 {flags}"
     jax.config.update("jax_enable_x64", True)
-    jax.config.update("jax_num_cpu_devices", cores)
-    return cores
+    jax.config.update("jax_num_cpu_devices", len(cores))
+    jax.block_until_ready(jax.numpy.zeros(1) + 1)
+    threads = [int(x.name) for x in Path("/proc/self/task").iterdir()]
+    workers = [t for t in threads if "XLAEigen" in Path(f"/proc/{t}/comm").read_text()]
+    for k, thread in enumerate(sorted(workers)):
+        os.sched_setaffinity(thread, {cores[k % len(cores)]})
+    return len(cores)
 
 
 def arguments(given: Columns, num_streams, dtype=np.float64, series=None):

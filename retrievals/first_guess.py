@@ -44,7 +44,8 @@ def candidates(cost: Float[np.ndarray, "pixel guess"]) -> tuple[np.ndarray, np.n
     The lowest of every pixel come first, in the order of pixels.
     """
     cost = np.nan_to_num(cost, nan=np.inf)
-    padded = np.pad(cost, [(0, 0), (1, 1)], constant_values=np.inf)
+    beyond = np.full((len(cost), 1), np.inf)
+    padded = np.concatenate([beyond, cost, beyond], axis=1)
     minimal = (cost < padded[:, :-2]) & (cost <= padded[:, 2:])
     best = np.argmin(cost, axis=1)
     pixels = np.arange(len(cost))

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from abi_operator import BANDS, Atmosphere, State, reflectance_factor
+from abi_operator import BANDS, Atmosphere, Plume, State, reflectance_factor
 from abi_operator.optics import column_optics
 from abi_operator.solver import sufficient_doublings
 
@@ -39,7 +39,7 @@ class ForwardModel(eqx.Module):
 
     def state(self, x: Float[Array, "*batch x"], state: State) -> State:
         """Put x into a state."""
-        plume = self.vector.plume(x, state.atmosphere.plumes[self.species])
+        plume = self.vector.plume(x, plume_by_band(state, self.species))
         return eqx.tree_at(lambda s: s.atmosphere.plumes[self.species], state, plume)
 
     def __call__(self, x: Float[Array, "*batch x"], state: State) -> Float[Array, "*batch band"]:
@@ -50,6 +50,16 @@ class ForwardModel(eqx.Module):
             num_streams=self.num_streams,
             num_doublings=self.num_doublings,
         )
+
+
+def plume_by_band(state: State, species: str) -> Plume:
+    """The plume of a species, or `ValueError` if its optics are not specified by band."""
+    plume = state.atmosphere.plumes[species]
+    if not isinstance(plume, Plume):
+        raise ValueError(
+            f"{species!r} must be a Plume to be retrieved; got {type(plume).__name__}."
+        )
+    return plume
 
 
 def prepared(forward: ForwardModel, states: State) -> ForwardModel:

@@ -13,7 +13,7 @@ from abi_operator.files import InputError
 from abi_operator.nomenclature import PLUME, SCENARIO
 from abi_operator.scene import column_states
 
-from .forward import ForwardModel, prepared
+from .forward import ForwardModel, plume_by_band, prepared
 from .inverse import DEFAULT_MINIMISER, Minimiser
 from .observation import Observation, add_noise, observe, usable
 from .pixels import retrieve_pixels
@@ -106,7 +106,7 @@ def retrieve_smoke(
                 minimiser=minimiser,
                 exact=not noise and prior is None,
             )
-            fields = pixel_fields(vector, retrieved, states.atmosphere.plumes[_SPECIES].ssa)
+            fields = pixel_fields(vector, retrieved, plume_by_band(states, _SPECIES).ssa)
         codes[attempted] = retrieved.codes
     attributes = {
         "bands": " ".join(bands),

@@ -11,13 +11,14 @@ FLOORS = [
     {"cli"},
     {"simulation"},
     {"commands", "demo", "scene"},
-    {"files", "pictures", "products"},
+    {"files", "instrument", "pictures", "products"},
     {"reflectance"},
-    {"optics", "solver"},
-    {"optical_properties"},
+    {"optics", "solver", "surface"},
+    {"microphysics", "optical_properties", "standard_atmospheres"},
     {"atmosphere"},
-    {"geometry"},
-    {"_batching", "_numerics", "_version", "bands", "constants", "nomenclature"},
+    {"geometry", "planck"},
+    {"satellites"},
+    {"_batching", "_kernels", "_numerics", "_version", "bands", "constants", "nomenclature"},
 ]
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 

@@ -3,9 +3,10 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..atmosphere import Atmosphere
+from ..atmosphere import Atmosphere, MiePlume, Plume
 from ..bands import Band
 from ..optical_properties import OpticalProperties, Scatterer
+from .mie_aerosol import mie_optics
 from .phase import HenyeyGreenstein
 
 
@@ -38,7 +39,9 @@ def aerosol(atmosphere: Atmosphere, plume: str, band: Band) -> OpticalProperties
     .. math:: \tau_k = b\, \beta_{550}\, r_\mathrm{band}\, h_k
 
     with brightness b, extinction coefficient :math:`\beta_{550}`, relative extinction r and the
-    length h of the layer inside the plume (`overlap`).
+    length h of the layer inside the plume (`overlap`). Of a `Plume`, relative extinction,
+    single-scattering albedo and asymmetry factor are those specified; of a `MiePlume`, those of
+    its species at its effective radius (`mie_optics`).
 
     Parameters
     ----------
@@ -52,24 +55,33 @@ def aerosol(atmosphere: Atmosphere, plume: str, band: Band) -> OpticalProperties
     Raises
     ------
     ValueError
-        Where the atmosphere has no such plume or the plume no such band.
+        Where the atmosphere has no such plume, the plume no such band or its species no table.
     """
     if plume not in atmosphere.plumes:
         raise ValueError(f"no plume {plume!r}; the atmosphere has {sorted(atmosphere.plumes)}.")
     properties = atmosphere.plumes[plume]
-    for name in ("relative_extinction", "ssa", "asymmetry"):
-        if band.name not in getattr(properties, name):
-            raise ValueError(
-                f"{name} of plume {plume!r} is not specified in band {band.name!r}, only in "
-                f"{sorted(getattr(properties, name))}."
-            )
-    coefficient = (
-        properties.brightness
-        * properties.extinction_550
-        * properties.relative_extinction[band.name]
-    )
+    if isinstance(properties, MiePlume):
+        spheres = mie_optics(properties.species, properties.effective_radius_um, band.name)
+        relative, ssa, asymmetry = spheres._replace(coalbedo=1 - spheres.coalbedo)
+    else:
+        relative, ssa, asymmetry = _specified(properties, plume, band)
+    coefficient = properties.brightness * properties.extinction_550 * relative
     above_ground = atmosphere.height - atmosphere.height[-1]
     extinction = coefficient * overlap(above_ground, properties.base, properties.top)
-    phase = HenyeyGreenstein(properties.asymmetry[band.name])
-    scatterer = Scatterer(properties.ssa[band.name] * extinction, phase)
+    scatterer = Scatterer(ssa * extinction, HenyeyGreenstein(asymmetry))
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
+
+
+def _specified(properties: Plume, plume: str, band: Band) -> tuple[Array, Array, Array]:
+    """Relative extinction, single-scattering albedo and asymmetry factor in a band. [-]"""
+    values = []
+    for name in ("relative_extinction", "ssa", "asymmetry"):
+        by_band = getattr(properties, name)
+        if band.name not in by_band:
+            raise ValueError(
+                f"{name} of plume {plume!r} is not specified in band {band.name!r}, only in "
+                f"{sorted(by_band)}."
+            )
+        values.append(by_band[band.name])
+    relative_extinction, ssa, asymmetry = values
+    return relative_extinction, ssa, asymmetry

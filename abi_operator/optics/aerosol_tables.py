@@ -35,13 +35,19 @@ def referred_to_550(rows: dict[str, tuple[float, float, float]]) -> AerosolOptic
 
 # Biomass-burning model of 6SV2.1 (Vermote et al. 1997, doi:10.1109/36.581987), which is AERONET's
 # Amazonian forest smoke (Dubovik et al. 2002, doi:10.1175/1520-0469(2002)059<0590:VOAAOP>2.0.CO;2),
-# log-log between the wavelengths of its table at the centroids of GOES-16. [-]
+# log-log between the wavelengths of its table at the centroids of GOES-16. [-] C07 is extrapolated
+# from the last wavelength, 3.75 um: Mie theory on the sizes and index of its source gives 0.055,
+# 0.853 and 0.703. Both take the index of refraction that was measured at 0.44-1.02 um.
 SMOKE = referred_to_550(
     {
         "C01": (1.3573, 0.9391, 0.6585),
+        "green": (1.0000, 0.9319, 0.6207),
         "C02": (0.7477, 0.9234, 0.5831),
         "C03": (0.3827, 0.8961, 0.4994),
+        "C04": (0.1460, 0.8397, 0.4731),
+        "C05": (0.1121, 0.8248, 0.5074),
         "C06": (0.0782, 0.8220, 0.6180),
+        "C07": (0.0567, 0.8539, 0.6980),
     }
 )
 
@@ -54,8 +60,12 @@ SMOKE = referred_to_550(
 ASH = referred_to_550(
     {
         "C01": (0.9873, 0.9062, 0.7883),
+        "green": (1.0000, 0.9173, 0.7762),
         "C02": (1.0122, 0.9264, 0.7659),
         "C03": (1.0471, 0.9424, 0.7405),
+        "C04": (1.1246, 0.9622, 0.7048),
+        "C05": (1.1572, 0.9675, 0.6954),
         "C06": (1.2208, 0.9766, 0.6828),
+        "C07": (1.2058, 0.9860, 0.6764),
     }
 )

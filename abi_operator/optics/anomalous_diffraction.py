@@ -21,10 +21,10 @@ diameters are closed forms: with u in units of its scale s = 1 / (Lam lambda),
 also for complex z, of which modulus and angle are carried as real numbers.
 
 The coefficients are quoted second-hand; what vouches for them here is Mie theory for droplets with
-nu = 7. From an effective radius of 10 um on, Q_ext is within 0.7 % in C01-C03 and 4.5 % in C06, and
-from 4 um on within 5 % and 6.5 %. From 4 um on, absorption is within 10 % in C03 and C06. In C01
-and C02, where it is 1e-5 of extinction or less, narrow resonances leave Mie theory itself
-uncertain by 10 to 30 %.
+nu = 7. From an effective radius of 10 um on, Q_ext is within 0.7 % in C01-C03 and 4.5 % in C04-C06,
+and from 4 um on within 5 % and 7 %; in C07, where droplets are as large as the wavelength, within
+8 %. From 4 um on, absorption is within 11 % in C03-C07. In C01, the green and C02, where it is 1e-5
+of extinction or less, narrow resonances leave Mie theory itself uncertain by 10 to 30 %.
 
 References
 ----------
@@ -40,6 +40,7 @@ import math
 from typing import NamedTuple
 
 import jax.numpy as jnp
+from jax.scipy.special import gammaln
 from jaxtyping import Array, Float
 
 EDGE = 2.0  # strength of the edge effect, a6 [-]
@@ -71,7 +72,10 @@ def mean_efficiencies(
     effective_radius_um: Float[Array, "*n"],
     wavelength_um: float,
     refractive_index: complex,
-    nu: float,
+    nu: float | Array,
+    *,
+    internal_reflection: float | Array | None = None,
+    tunnelling_factor: float | Array = 1.0,
 ) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
     """Efficiencies for extinction and absorption, averaged by area over droplets of all sizes. [-]
 
@@ -85,11 +89,16 @@ def mean_efficiencies(
         n - ik, with k of 0 or more. [-]
     nu
         Shape of the gamma distribution of diameters. [-]
+    internal_reflection
+        Coefficient a1, in place of that of spheres. [-]
+    tunnelling_factor
+        Tunnelling relative to that of spheres, less than 1 for crystals. [-]
     """
     scale = effective_radius_um * (2 / ((nu + 3) * wavelength_um))
     absorption = scale * (8 * math.pi * -refractive_index.imag / 3)
     a1, a2, epsilon = corrections(refractive_index)
-    decay, tunnelling = epsilon * scale, a2 * jnp.sqrt(scale)
+    a1 = a1 if internal_reflection is None else internal_reflection
+    decay, tunnelling = epsilon * scale, tunnelling_factor * (a2 * jnp.sqrt(scale))
 
     q_abs = (
         _mean_loss(0.0, jnp.zeros_like(scale), absorption, nu)
@@ -105,12 +114,14 @@ def mean_efficiencies(
     return q_ext, q_abs
 
 
-def _gamma_ratio(q: float, nu: float) -> float:
+def _gamma_ratio(q: float, nu: float | Array) -> float | Array:
     """Gamma(nu + 3 + q) / Gamma(nu + 3)."""
-    return math.exp(math.lgamma(nu + 3 + q) - math.lgamma(nu + 3))
+    if isinstance(nu, float | int):
+        return math.exp(math.lgamma(nu + 3 + q) - math.lgamma(nu + 3))
+    return jnp.exp(gammaln(nu + 3 + q) - gammaln(nu + 3))
 
 
-def _mean_loss(q: float, z: Array, rate: Array, nu: float) -> Array:
+def _mean_loss(q: float, z: Array, rate: Array, nu: float | Array) -> Array:
     """Mean of u^q exp(-z u) (1 - exp(-rate u)), to full relative accuracy at small rates."""
     power = nu + 3 + q
     transmitted = _gamma_ratio(q, nu) * jnp.exp(-power * jnp.log1p(z))
@@ -118,7 +129,7 @@ def _mean_loss(q: float, z: Array, rate: Array, nu: float) -> Array:
 
 
 def _mean_diffraction(
-    q: float, z: Array, scale: Array, refractive_index: complex, nu: float
+    q: float, z: Array, scale: Array, refractive_index: complex, nu: float | Array
 ) -> Array:
     """Mean of u^q exp(-z u) Re K(t), where t = w u is complex: w = 2 pi (k + i (n - 1)) scale."""
     n, k = refractive_index.real, -refractive_index.imag

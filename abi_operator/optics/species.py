@@ -1,4 +1,7 @@
-"""Plumes of smoke and ash with published optics, every number of which can be replaced."""
+"""Plumes: of smoke and ash with published optics, and of spheres by their effective radius.
+
+Every number of the published optics can be replaced.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,9 +12,10 @@ from jax.core import Tracer
 from jax.typing import ArrayLike
 from jaxtyping import Array
 
-from ..atmosphere import Plume
+from ..atmosphere import MiePlume, Plume
 from ..bands import GRASSO2013, check_bands
 from .aerosol_tables import ASH, SMOKE, AerosolOptics
+from .mie_table import mie_table
 
 
 def smoke(
@@ -89,6 +93,53 @@ def ash(
     return _plume("ash", extent, ASH, given, bands)
 
 
+def mie_plume(
+    species: str,
+    aod_550: ArrayLike,
+    effective_radius_um: ArrayLike,
+    *,
+    base: ArrayLike,
+    top: ArrayLike,
+    brightness: ArrayLike = 1.0,
+) -> MiePlume:
+    """Plume of spheres, the optics of which follow from their effective radius in every band.
+
+    Arguments broadcast, so that an array of radii makes a batch of plumes.
+
+    Parameters
+    ----------
+    species
+        Name of a species that has a table (`mie_species`).
+    aod_550
+        Optical depth at 550 nm where brightness is 1. [-]
+    effective_radius_um
+        Effective radius; of smoke, that of its fine mode. Beyond the table of the species optics
+        are those at its end (`mie_optics`). [um]
+    base, top
+        Edges above the ground. [m]
+    brightness
+        Horizontal weight, 0 to 1. [-]
+
+    Raises
+    ------
+    ValueError
+        Where there is no such species, or where a value is out of its range, unless it is traced.
+    """
+    mie_table(species)
+    extent = {"aod_550": aod_550, "brightness": brightness, "base": base, "top": top}
+    plume = _broadcast(extent | {"effective_radius_um": effective_radius_um})
+    _check_extent(species, plume)
+    _check(species, "effective_radius_um", "above 0", plume["effective_radius_um"] > 0)
+    return MiePlume(
+        base=plume["base"],
+        top=plume["top"],
+        extinction_550=plume["aod_550"] / (plume["top"] - plume["base"]),
+        brightness=plume["brightness"],
+        effective_radius_um=plume["effective_radius_um"],
+        species=species,
+    )
+
+
 def _plume(
     species: str,
     extent: dict[str, ArrayLike],
@@ -105,17 +156,13 @@ def _plume(
         if unknown:
             raise ValueError(f"{name} of {species} is given in {unknown}, outside {bands=}.")
         optics[name] = {band: values.get(band, getattr(published, name)[band]) for band in bands}
-
-    numbers, structure = jax.tree.flatten(extent | optics)
-    dtype = jnp.result_type(float, *numbers)
-    arrays = jnp.broadcast_arrays(*(jnp.asarray(number, dtype) for number in numbers))
-    plume = jax.tree.unflatten(structure, arrays)
-    _check(species, plume)
-    thickness = plume["top"] - plume["base"]
+    plume = _broadcast(extent | optics)
+    _check_extent(species, plume)
+    _check_optics(species, plume)
     return Plume(
         base=plume["base"],
         top=plume["top"],
-        extinction_550=plume["aod_550"] / thickness,
+        extinction_550=plume["aod_550"] / (plume["top"] - plume["base"]),
         brightness=plume["brightness"],
         relative_extinction=plume["relative_extinction"],
         ssa=plume["ssa"],
@@ -123,19 +170,30 @@ def _plume(
     )
 
 
-def _check(species: str, plume: dict) -> None:
-    """Raise `ValueError` naming the first quantity that is out of range."""
+def _broadcast(plume: dict) -> dict:
+    """Bring all numbers of a plume to one dtype and shape."""
+    numbers, structure = jax.tree.flatten(plume)
+    dtype = jnp.result_type(float, *numbers)
+    arrays = jnp.broadcast_arrays(*(jnp.asarray(number, dtype) for number in numbers))
+    return jax.tree.unflatten(structure, arrays)
 
-    def check(name: str, requirement: str, holds: Array) -> None:
-        if not isinstance(holds, Tracer) and not np.all(holds):
-            raise ValueError(f"{name} of {species} must be {requirement}.")
 
-    check("top", "above base", plume["top"] > plume["base"])
-    check("aod_550", "0 or more", plume["aod_550"] >= 0)
-    check("brightness", "0 or more", plume["brightness"] >= 0)
+def _check(species: str, name: str, requirement: str, holds: Array) -> None:
+    """Raise `ValueError` naming a quantity that is out of range, unless it is traced."""
+    if not isinstance(holds, Tracer) and not np.all(holds):
+        raise ValueError(f"{name} of {species} must be {requirement}.")
+
+
+def _check_extent(species: str, plume: dict) -> None:
+    _check(species, "top", "above base", plume["top"] > plume["base"])
+    _check(species, "aod_550", "0 or more", plume["aod_550"] >= 0)
+    _check(species, "brightness", "0 or more", plume["brightness"] >= 0)
+
+
+def _check_optics(species: str, plume: dict) -> None:
     for band, extinction in plume["relative_extinction"].items():
-        check(f"relative_extinction[{band!r}]", "0 or more", extinction >= 0)
+        _check(species, f"relative_extinction[{band!r}]", "0 or more", extinction >= 0)
     for band, ssa in plume["ssa"].items():
-        check(f"ssa[{band!r}]", "between 0 and 1", (ssa >= 0) & (ssa <= 1))
-    for band, asymmetry in plume["asymmetry"].items():
-        check(f"asymmetry[{band!r}]", "between -1 and 1, exclusive", abs(asymmetry) < 1)
+        _check(species, f"ssa[{band!r}]", "between 0 and 1", (ssa >= 0) & (ssa <= 1))
+    for band, g in plume["asymmetry"].items():
+        _check(species, f"asymmetry[{band!r}]", "between -1 and 1, exclusive", abs(g) < 1)

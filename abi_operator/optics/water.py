@@ -9,25 +9,54 @@ from jaxtyping import Array, Float
 # log-log, from the tables of refractiveindex.info, CC0)
 REFRACTIVE_INDEX: dict[str, complex] = {
     "C01": 1.3419 - 7.228e-10j,
+    "green": 1.3356 - 2.674e-9j,
     "C02": 1.3312 - 1.569e-8j,
     "C03": 1.3244 - 3.527e-7j,
+    "C04": 1.3145 - 6.239e-5j,
+    "C05": 1.3094 - 8.859e-5j,
     "C06": 1.2825 - 3.635e-4j,
+    "C07": 1.3406 - 3.769e-3j,
 }
 
 # Asymmetry factor of gamma distributions (nu = 7) of spheres with this refractive index, against
 # effective radius. [um], [-] (Mie theory, miepython 3.3, 40000 diameters in 0.05-500 um equidistant
-# in their logarithm; 2 and 50 um are there so that zero end slopes cost nothing in 2.5-40 um)
+# in their logarithm, by benchmarks/make_water_tables.py; 2 and 50 um are there so that zero end
+# slopes cost nothing in 2.5-40 um)
 EFFECTIVE_RADIUS_UM = (2, 2.5, 3, 3.5, 4, 4.5, 5, 6, 7, 8, 10, 12, 15, 20, 30, 40, 50)
 # fmt: off
 ASYMMETRY: dict[str, tuple[float, ...]] = {
-    "C01": (0.81724, 0.82779, 0.83471, 0.83989, 0.84395, 0.84724, 0.84995, 0.85418, 0.85734,
-            0.85980, 0.86339, 0.86590, 0.86853, 0.87132, 0.87428, 0.87586, 0.87684),
-    "C02": (0.79777, 0.81553, 0.82595, 0.83278, 0.83784, 0.84188, 0.84522, 0.85047, 0.85441,
-            0.85749, 0.86202, 0.86519, 0.86851, 0.87203, 0.87583, 0.87787, 0.87914),
-    "C03": (0.77246, 0.79215, 0.80861, 0.81987, 0.82754, 0.83307, 0.83736, 0.84384, 0.84869,
-            0.85249, 0.85811, 0.86207, 0.86624, 0.87069, 0.87551, 0.87812, 0.87978),
-    "C06": (0.86362, 0.86179, 0.84976, 0.83323, 0.81745, 0.80633, 0.80119, 0.80425, 0.81468,
-            0.82566, 0.84278, 0.85367, 0.86362, 0.87370, 0.88565, 0.89309, 0.89848),
+    "C01": (
+        0.81724, 0.82779, 0.83471, 0.83989, 0.84395, 0.84724, 0.84995, 0.85418, 0.85734,
+        0.85980, 0.86339, 0.86590, 0.86853, 0.87132, 0.87428, 0.87586, 0.87684,
+    ),
+    "green": (
+        0.80853, 0.82245, 0.83073, 0.83657, 0.84110, 0.84477, 0.84781, 0.85257, 0.85613,
+        0.85891, 0.86298, 0.86583, 0.86882, 0.87198, 0.87537, 0.87718, 0.87831,
+    ),
+    "C02": (
+        0.79777, 0.81553, 0.82595, 0.83278, 0.83784, 0.84188, 0.84522, 0.85047, 0.85441,
+        0.85749, 0.86202, 0.86519, 0.86851, 0.87203, 0.87583, 0.87787, 0.87914,
+    ),
+    "C03": (
+        0.77246, 0.79215, 0.80861, 0.81987, 0.82754, 0.83307, 0.83736, 0.84384, 0.84869,
+        0.85249, 0.85811, 0.86207, 0.86624, 0.87069, 0.87551, 0.87812, 0.87978,
+    ),
+    "C04": (
+        0.80315, 0.77875, 0.77538, 0.78433, 0.79614, 0.80694, 0.81582, 0.82845, 0.83657,
+        0.84228, 0.85028, 0.85594, 0.86203, 0.86871, 0.87632, 0.88078, 0.88387,
+    ),
+    "C05": (
+        0.82836, 0.80094, 0.78240, 0.77879, 0.78480, 0.79420, 0.80373, 0.81934, 0.83008,
+        0.83747, 0.84702, 0.85339, 0.86019, 0.86770, 0.87631, 0.88139, 0.88491,
+    ),
+    "C06": (
+        0.86362, 0.86179, 0.84976, 0.83323, 0.81745, 0.80633, 0.80119, 0.80425, 0.81468,
+        0.82566, 0.84278, 0.85367, 0.86362, 0.87370, 0.88565, 0.89309, 0.89848,
+    ),
+    "C07": (
+        0.79407, 0.81948, 0.82874, 0.82834, 0.82176, 0.81151, 0.79983, 0.78018, 0.77301,
+        0.77772, 0.80106, 0.82329, 0.84607, 0.86775, 0.89256, 0.90864, 0.92025,
+    ),
 }
 # fmt: on
 
@@ -45,13 +74,30 @@ def droplet_asymmetry(effective_radius_um: Float[Array, "*n"], band: str) -> Flo
     band
         Name of the band.
     """
-    dtype = effective_radius_um.dtype
-    nodes = np.log(EFFECTIVE_RADIUS_UM)
-    cubics = jnp.asarray(_hermite_cubics(nodes, np.asarray(ASYMMETRY[band])), dtype)
-    knots = jnp.asarray(nodes, dtype)
-    x = jnp.clip(jnp.log(effective_radius_um), knots[0], knots[-1])
-    interval = jnp.sum(x[..., None] >= knots[1:-1], axis=-1)
-    t = x - knots[interval]
+    return interpolate(effective_radius_um, EFFECTIVE_RADIUS_UM, ASYMMETRY[band])
+
+
+def interpolate(
+    x: Float[Array, "*n"], nodes: tuple[float | int, ...], values: tuple[float, ...]
+) -> Float[Array, "*n"]:
+    """Value of a table in the logarithm of `x`: cubics, constant beyond both ends.
+
+    The slope is continuous everywhere, and zero at both ends.
+
+    Parameters
+    ----------
+    x
+        Where the table is read, above 0.
+    nodes, values
+        The table; nodes rise.
+    """
+    dtype = x.dtype
+    log_nodes = np.log(nodes)
+    cubics = jnp.asarray(_hermite_cubics(log_nodes, np.asarray(values)), dtype)
+    knots = jnp.asarray(log_nodes, dtype)
+    log_x = jnp.clip(jnp.log(x), knots[0], knots[-1])
+    interval = jnp.sum(log_x[..., None] >= knots[1:-1], axis=-1)
+    t = log_x - knots[interval]
     c0, c1, c2, c3 = jnp.moveaxis(cubics[interval], -1, 0)
     return c0 + t * (c1 + t * (c2 + t * c3))
 

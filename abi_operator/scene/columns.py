@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..atmosphere import Atmosphere, LiquidCloud, Plume, State
+from ..atmosphere import Atmosphere, LiquidCloud, MiePlume, Plume, State
 from ..bands import GRASSO2013, check_bands
 from ..geometry import Geometry
 from ..nomenclature import PLUME
@@ -40,7 +40,9 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     liquid = LiquidCloud(
         reader.values("liquid_mass_path", "layer"), reader.values("liquid_number_path", "layer")
     )
-    plumes = {species: _plume(reader, species, bands) for species in species_of(scenario)}
+    plumes: dict[str, Plume | MiePlume] = {
+        species: _plume(reader, species, bands) for species in species_of(scenario)
+    }
     atmosphere = Atmosphere(
         reader.values("pressure", "level"), reader.values("height", "level"), liquid, plumes
     )

@@ -36,6 +36,7 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
+from .._kernels import one_kernel
 from .._numerics import fenced, matmul
 from .adding import add_layer, top
 from .azimuth import mode_kernels
@@ -101,10 +102,15 @@ def mode_sum(
     """
     modes = _Modes(inputs)
 
+    def put_on(stack, layer, kernels, view_secant):
+        a, p = layer.matrices(kernels, view_secant, single_scattering)
+        return add_layer(stack, *half_layer(a, p, layer.tau, num_doublings), layer.tau)
+
+    put_on = one_kernel(put_on, modes.num_nodes)
+
     def reflection(layers, kernels, ground):
         def add(stack, layer):
-            a, p = layer.matrices(kernels, inputs.view_secant, single_scattering)
-            return add_layer(stack, *half_layer(a, p, layer.tau, num_doublings), layer.tau), None
+            return put_on(stack, layer, kernels, inputs.view_secant), None
 
         stack, _ = jax.lax.scan(add, ground, layers, reverse=True)
         return top(stack).reflection()[0]
@@ -190,7 +196,8 @@ class _Modes:
     def __init__(self, inputs: ModeSum):
         even, odd = inputs.moments
         self.inputs, self.moments = inputs, jnp.stack([even, odd])
-        self.num_streams = even.shape[1] + odd.shape[1]
+        self.num_nodes = even.shape[1]
+        self.num_streams = 2 * self.num_nodes
         num_modes = inputs.weights.shape[0]
         functions = node_functions(self.num_streams, num_modes)
         self.nodes = tuple(
@@ -256,26 +263,29 @@ def _mode(
     clear it, nor copy it, one after the other.
     """
 
-    def put_on(stack, layer):
+    num_nodes = layers.even.shape[1]
+
+    def put_on(stack, layer, kernels, view_secant):
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return climb(stack, a, p, layer.tau, num_doublings)
 
+    put_on = one_kernel(put_on, num_nodes)
+
     def up(carry, x):
         (stack, kept), (layer, number) = carry, x
-        stack, new = put_on(stack, layer)
+        stack, new = put_on(stack, layer, kernels, view_secant)
         write = partial(jax.lax.dynamic_update_index_in_dim, index=number, axis=0)
         return (stack, jax.tree.map(write, kept, new)), None
 
     numbers = jnp.arange(layers.tau.shape[0])
     if kept is None:
         one = jax.tree.map(lambda x: x[0], layers)
-        shapes = jax.eval_shape(lambda: put_on(ground, one)[1])
+        shapes = jax.eval_shape(lambda: put_on(ground, one, kernels, view_secant)[1])
         kept = jax.tree.map(lambda x: jnp.zeros((numbers.size, *x.shape), x.dtype), shapes)
     (stack, kept), _ = jax.lax.scan(up, (ground, kept), (layers, numbers), reverse=True)
     reflection, fields = _fields_at_the_top(stack, weight)
 
-    def down(carry, x):
-        (fields, *totals), (layer, kept) = carry, x
+    def undo(fields, totals, layer, kept, kernels, view_secant):
         # The beams' own entries of the stack are 1 whatever happens in it.
         fields = fields._replace(other=jnp.zeros_like(fields.other))
         secants = layer.secants(view_secant)
@@ -285,12 +295,17 @@ def _mode(
         )
         b, _ = undo_matrix(kernels[1], layer.odd, secants, b_bar, single_scattering)
         step = 0.5 / 2**num_doublings
-        totals, slopes = _collected(step, layer.tau, totals, a, b, coalbedo)
-        return (fields, *totals), slopes
+        return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
 
-    start = [jnp.zeros_like(x) for x in (kernels[0].beams, kernels[1].beams, view_secant)]
-    (fields, *totals), slopes = jax.lax.scan(down, (fields, *start), (layers, kept))
-    even, odd, view = totals
+    undo = one_kernel(undo, num_nodes)
+
+    def down(carry, x):
+        (fields, totals), (layer, kept) = carry, x
+        fields, totals, slopes = undo(fields, totals, layer, kept, kernels, view_secant)
+        return (fields, totals), slopes
+
+    start = tuple(jnp.zeros_like(x) for x in (kernels[0].beams, kernels[1].beams, view_secant))
+    (fields, (even, odd, view)), slopes = jax.lax.scan(down, (fields, start), (layers, kept))
     return reflection, kept, _Slopes(slopes, even, odd, view, pair(1.0, fields))
 
 

@@ -12,7 +12,7 @@ from .._batching import tile_size
 from .column import Column, Options, aligned, promoted
 from .derivative import independent_columns
 from .program import GroundResponse, ground_response, plane_albedo
-from .surface import Surface
+from .surface import AnySurface
 from .toa_brf import outward, prepare
 
 
@@ -20,7 +20,7 @@ def toa_albedo(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
     moments: Float[ArrayLike, "*batch layer moment"],
-    albedo: Float[ArrayLike, "*batch"] | Surface,
+    albedo: Float[ArrayLike, "*batch"] | AnySurface,
     mu0: Float[ArrayLike, "*batch"],
     *,
     num_streams: int = 16,

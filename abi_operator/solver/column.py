@@ -9,7 +9,7 @@ import numpy as np
 from jax.core import Tracer
 
 from .doublings import sufficient_doublings, unknown_doublings
-from .surface import Lambertian, Surface
+from .surface import AnySurface, Lambertian
 
 
 class Column(NamedTuple):
@@ -21,7 +21,7 @@ class Column(NamedTuple):
     tau: jax.Array
     ssa: jax.Array
     moments: jax.Array
-    albedo: jax.Array | Surface
+    albedo: jax.Array | AnySurface
     mu0: jax.Array
     mu: jax.Array
     relative_azimuth: jax.Array
@@ -73,7 +73,7 @@ def promoted(**arguments: Any) -> Column:
         for leaf, array in zip(leaves, arrays, strict=True)
     ]
     dtype = jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
-    return jax.tree.unflatten(structure, [x.astype(dtype) for x in arrays])
+    return jax.tree.unflatten(structure, [x.astype(dtype, copy=False) for x in arrays])
 
 
 def check_shapes(column: Column, num_moments: int, multiple_views: bool) -> None:

@@ -28,7 +28,7 @@ from .single_scatter import (
     direct_transmission,
     exact_single_scattering,
 )
-from .surface import Surface
+from .surface import AnySurface
 
 
 class Emerging(NamedTuple):
@@ -158,10 +158,10 @@ class _Problem:
         return {"num_doublings": options.num_doublings, "single_scattering": not options.tms}
 
 
-def _grounds(albedo: Array | Surface, problem: _Problem) -> tuple[Bordered, Bordered | None]:
+def _grounds(albedo: Array | AnySurface, problem: _Problem) -> tuple[Bordered, Bordered | None]:
     """Ground in mode 0, and in the others (None where they do not see it)."""
     cosines, num_streams = problem.directions.cosines, problem.options.num_streams
-    if not isinstance(albedo, Surface):
+    if not isinstance(albedo, AnySurface):
         return lambertian(albedo, cosines, num_streams), None
 
     # All modes at once: a reflectance is evaluated at its azimuths only once.
@@ -176,7 +176,7 @@ def _brf(problem: _Problem, reflection: Float[Array, "view *batch"]) -> Float[Ar
     column, options, layers = problem.column, problem.options, problem.layers
     mu0, mu, sun = column.mu0, column.mu, problem.directions.sun_secants
     brf = 0.5 * reflection
-    if isinstance(column.albedo, Surface):
+    if isinstance(column.albedo, AnySurface):
         reflected = column.albedo.brdf(mu, mu0[None], column.relative_azimuth)
         brf = brf + reflected * direct_transmission(layers.tau, mu, sun)
     if not options.tms:

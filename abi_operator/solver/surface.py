@@ -1,11 +1,21 @@
 """What the solver asks of a ground, and the plainest one."""
 
 import abc
+from typing import Any, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
+
+
+@runtime_checkable
+class AnySurface(Protocol):
+    """What the solver asks of a ground: the two methods of a `Surface`, subclass or not."""
+
+    def brdf(self, mu_out: Any, mu_in: Any, relative_azimuth: Any) -> Any: ...
+
+    def modes(self, m: Any, mu_out: Any, mu_in: Any) -> Any: ...
 
 
 class Surface(eqx.Module):

@@ -19,14 +19,14 @@ from .column import (
 )
 from .derivative import independent_columns
 from .program import emerging
-from .surface import Surface
+from .surface import AnySurface
 
 
 def toa_brf(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
     moments: Float[ArrayLike, "*batch layer moment"],
-    albedo: Float[ArrayLike, "*batch"] | Surface,
+    albedo: Float[ArrayLike, "*batch"] | AnySurface,
     mu0: Float[ArrayLike, "*batch"],
     mu: Float[ArrayLike, "*batch"],
     relative_azimuth: Float[ArrayLike, "*batch"],
@@ -56,7 +56,7 @@ def toa_brf(
         Legendre moments of each layer's phase function, chi_0 = 1 (not read), without the factor
         2l + 1: `num_streams` + 1 at least, `num_streams` without delta-M. [-]
     albedo
-        Lambertian albedo of the ground [-], or a `Surface`.
+        Lambertian albedo of the ground [-], or a `Surface`: anything with its two methods.
     mu0, mu
         Cosines of the solar and view zenith angles, both above 0. At 1, where the derivative in
         the cosine is infinite, the one with the sine held at 0 is returned, so that by a zenith

@@ -11,7 +11,7 @@ from .._batching import tile_size
 from .column import Column, Options, aligned, promoted
 from .derivative import independent_columns
 from .program import emerging
-from .surface import Surface
+from .surface import AnySurface
 from .toa_brf import outward, prepare
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
@@ -22,7 +22,7 @@ def toa_radiance(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
     moments: Float[ArrayLike, "*batch layer moment"],
-    albedo: Float[ArrayLike, "*batch"] | Surface,
+    albedo: Float[ArrayLike, "*batch"] | AnySurface,
     mu0: Float[ArrayLike, "*batch"],
     mu: Float[ArrayLike, "*batch"],
     relative_azimuth: Float[ArrayLike, "*batch"],

@@ -7,9 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.bands import BANDS, GRASSO2013
+from abi_operator.bands import BANDS
 from abi_operator.optics import aerosol, ash, smoke
 from abi_operator.optics.aerosol import overlap
+from abi_operator.optics.mie_aerosol import mie_optics
+from abi_operator.optics.species import mie_plume
 
 ROUNDING = 1e-12
 LEVELS = jnp.array([4.0, 3.0, 2.0, 1.0, 0.0])
@@ -37,10 +39,13 @@ def test_derivative_on_a_level_belongs_to_the_layer_inside(mode):
     np.testing.assert_array_equal(to_top, [0, 1, 0, 0])
 
 
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", BANDS)
 @pytest.mark.parametrize("species", ["smoke", "ash"])
 def test_optical_depth_does_not_depend_on_the_levels(make_atmosphere, band, species):
-    plumes = {"smoke": smoke(0.8, brightness=0.7), "ash": ash(0.5, brightness=0.4)}
+    plumes = {
+        "smoke": smoke(0.8, brightness=0.7, bands=tuple(BANDS)),
+        "ash": ash(0.5, brightness=0.4, bands=tuple(BANDS)),
+    }
     plume = plumes[species]
     expected = plume.aod_550 * plume.relative_extinction[band]
     for num_layers in (10, 27, 50):
@@ -54,21 +59,99 @@ def test_optical_depth_does_not_depend_on_the_levels(make_atmosphere, band, spec
         )
 
 
-@pytest.mark.parametrize("edge", ["base", "top"])
-def test_derivative_to_the_edges_against_differences(make_atmosphere, edge):
-    atmosphere = make_atmosphere()
+@pytest.mark.parametrize("band", BANDS)
+@pytest.mark.parametrize(("species", "radius"), [("smoke", 0.14), ("ash", 2.5), ("dust", 1.2)])
+def test_spheres_fill_their_extent_on_any_levels(make_atmosphere, band, species, radius):
+    plume = mie_plume(species, 0.8, radius, base=1130.0, top=5270.0, brightness=0.7)
+    spheres = mie_optics(species, plume.effective_radius_um, band)
+    for num_layers in (10, 27, 50):
+        optics = aerosol(make_atmosphere(num_layers, plumes={"any": plume}), "any", BANDS[band])
+        expected = 0.8 * 0.7 * spheres.relative_extinction
+        np.testing.assert_allclose(optics.tau.sum(), expected, rtol=ROUNDING)
+        inside = optics.tau[0] > 0
+        np.testing.assert_allclose(1 - optics.ssa[0, inside], spheres.coalbedo, rtol=ROUNDING)
+        np.testing.assert_allclose(optics.moments(2)[inside, 1], spheres.asymmetry, rtol=ROUNDING)
+        np.testing.assert_array_equal(optics.ssa[0, ~inside], 0)
 
-    def tau(value):
-        plume = dataclasses.replace(atmosphere.plumes["smoke"], **{edge: value})
-        moved = dataclasses.replace(atmosphere, plumes={"smoke": plume})
-        return aerosol(moved, "smoke", BANDS["C01"]).tau[0]
 
-    value, step = getattr(atmosphere.plumes["smoke"], edge), 1.0
-    differences = (tau(value + step) - tau(value - step)) / (2 * step)
-    assert np.count_nonzero(differences) == 1
+def by_edges(atmosphere, name, band):
+    """Optical depth of the layers as a function of base and top of a plume."""
+
+    def tau(edges):
+        plume = dataclasses.replace(atmosphere.plumes[name], base=edges[0], top=edges[1])
+        moved = dataclasses.replace(atmosphere, plumes={name: plume})
+        return aerosol(moved, name, BANDS[band]).tau[0]
+
+    return jax.jit(tau)
+
+
+PLUMES = {
+    "specified": smoke(0.8, base=1130.0, top=3170.0),
+    "spheres": mie_plume("ash", 0.8, 3.0, base=1130.0, top=3170.0),
+}
+
+
+@pytest.mark.parametrize("name", PLUMES)
+def test_derivative_to_the_edges_against_differences(make_atmosphere, name):
+    tau = by_edges(make_atmosphere(plumes={name: PLUMES[name]}), name, "C01")
+    edges, step = jnp.array([1130.0, 3170.0]), 1.0
+    steps = step * jnp.eye(2)
+    differences = jnp.stack([tau(edges + h) - tau(edges - h) for h in steps], axis=1) / (2 * step)
+    np.testing.assert_array_equal(np.count_nonzero(differences, axis=0), [1, 1])
     # Extinction is linear in the edge: what is left is rounding of depth / step.
-    np.testing.assert_allclose(jax.jacfwd(tau)(value), differences, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(jax.jacrev(tau)(value), differences, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(jax.jacfwd(tau)(edges), differences, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(jax.jacrev(tau)(edges), differences, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", PLUMES)
+def test_derivative_to_edges_on_levels_is_that_of_a_shrinking_plume(make_atmosphere, name):
+    tau = by_edges(make_atmosphere(plumes={name: PLUMES[name]}), name, "C02")
+    edges, step = jnp.array([2000.0, 6000.0]), 1.0  # levels are 2 km apart
+    shrinking = [(step, 0.0), (0.0, -step)]
+    differences = [(tau(edges + jnp.array(h)) - tau(edges)) / sum(h) for h in shrinking]
+    expected = jnp.stack(differences, axis=1)
+    assert np.all(np.any(expected != 0, axis=0))
+    np.testing.assert_allclose(jax.jacfwd(tau)(edges), expected, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(jax.jacrev(tau)(edges), expected, rtol=1e-9, atol=1e-15)
+
+
+def test_derivative_to_the_effective_radius_against_differences(make_atmosphere):
+    atmosphere = make_atmosphere(plumes={"spheres": PLUMES["spheres"]})
+
+    @jax.jit
+    def optics(radius):
+        plume = dataclasses.replace(PLUMES["spheres"], effective_radius_um=radius)
+        changed = dataclasses.replace(atmosphere, plumes={"spheres": plume})
+        value = aerosol(changed, "spheres", BANDS["C06"])
+        return jnp.stack([value.tau[0], value.scattering, value.moments(2)[:, 1]])
+
+    radius, step = jnp.asarray(3.1), 1e-5
+    differences = (optics(radius + step) - optics(radius - step)) / (2 * step)
+    assert np.count_nonzero(differences) == 6
+    np.testing.assert_allclose(jax.jacfwd(optics)(radius), differences, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(jax.jacrev(optics)(radius), differences, rtol=1e-6, atol=1e-12)
+
+
+def test_a_batch_of_plumes_of_spheres_is_a_loop(make_atmosphere):
+    radii, tops = np.array([0.5, 2.0, 7.0]), np.array([3e3, 4e3, 5e3])
+    plumes = mie_plume("ash", 0.5, radii, base=1e3, top=tops)
+    atmosphere = make_atmosphere(plumes={})
+
+    @jax.jit
+    def tau(plume):
+        column = dataclasses.replace(atmosphere, plumes={"ash": plume})
+        return aerosol(column, "ash", BANDS["C05"]).tau
+
+    loop = [tau(jax.tree.map(lambda leaf, i=i: leaf[i], plumes)) for i in range(3)]
+    np.testing.assert_allclose(jax.vmap(tau)(plumes), np.stack(loop), rtol=ROUNDING)
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize("name", PLUMES)
+def test_float32_stays(make_atmosphere, name):
+    atmosphere = make_atmosphere(dtype=jnp.float32, plumes={name: PLUMES[name]})
+    optics = aerosol(atmosphere, name, BANDS["C01"])
+    assert all(leaf.dtype == jnp.float32 for leaf in jax.tree.leaves(optics))
 
 
 def test_plume_counts_from_the_ground(make_atmosphere):
@@ -85,5 +168,5 @@ def test_missing_band_and_plume_are_named(make_atmosphere):
     atmosphere = make_atmosphere()
     with pytest.raises(ValueError, match=r"plume 'ash'.*band 'C03'.*\['C01', 'C06'\]"):
         aerosol(atmosphere, "ash", BANDS["C03"])
-    with pytest.raises(ValueError, match=r"no plume 'dust'.*\['ash', 'smoke'\]"):
-        aerosol(atmosphere, "dust", BANDS["C01"])
+    with pytest.raises(ValueError, match=r"no plume 'fog'.*\['ash', 'smoke'\]"):
+        aerosol(atmosphere, "fog", BANDS["C01"])

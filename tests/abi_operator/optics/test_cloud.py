@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from abi_operator.atmosphere import LiquidCloud
-from abi_operator.bands import BANDS, GRASSO2013, Band
+from abi_operator.bands import BANDS, Band
 from abi_operator.constants import WATER_DENSITY
 from abi_operator.optics import effective_radius, liquid_cloud
+
+# Droplets of the size of the wavelength are the hardest for anomalous diffraction.
+EXTINCTION = {"C07": 0.08}
 
 
 def with_cloud(atmosphere, mass, number):
@@ -19,7 +22,7 @@ def with_cloud(atmosphere, mass, number):
     return dataclasses.replace(atmosphere, liquid=liquid)
 
 
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", BANDS)
 def test_optical_depth_against_mie(make_atmosphere, droplet_mie, band):
     atmosphere = make_atmosphere()
     optics = liquid_cloud(atmosphere, BANDS[band])
@@ -29,7 +32,7 @@ def test_optical_depth_against_mie(make_atmosphere, droplet_mie, band):
     q_ext, q_abs, asymmetry = droplet_mie(band, 1e6 * float(radius))
     expected = 3 * mass * q_ext / (4 * WATER_DENSITY * radius)
     # Errors of modified anomalous diffraction at the 9.4 um of this layer; see its own tests.
-    np.testing.assert_allclose(optics.tau[0, layer], expected, rtol=0.05)
+    np.testing.assert_allclose(optics.tau[0, layer], expected, rtol=EXTINCTION.get(band, 0.05))
     np.testing.assert_allclose(1 - optics.ssa[0, layer], q_abs / q_ext, rtol=0.16)
     np.testing.assert_allclose(optics.moments(2)[layer, 1], asymmetry, rtol=0, atol=1e-3)
 
@@ -56,7 +59,7 @@ def test_depth_is_linear_in_traces_of_mass(make_atmosphere):
 
 @pytest.mark.float32
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", ["C06"])  # bands differ in constants alone
 def test_derivatives_are_finite_at_any_mass_and_number(make_atmosphere, mode, band):
     values = [0.0, 1e-30, 1e-18, 1e-3, 1.0, 1e10]
     mass, number = (grid.ravel() for grid in np.meshgrid(values, values))

@@ -1,5 +1,7 @@
 """Builders of plumes, and the published numbers they use."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import miepython
@@ -9,11 +11,13 @@ import pytest
 from abi_operator.bands import BANDS, GRASSO2013
 from abi_operator.optics import ash, smoke
 from abi_operator.optics.aerosol_tables import ASH, SMOKE
+from abi_operator.optics.species import mie_plume
 
 LAST_DIGIT = 6e-4  # of the ash table, and of sums over 1000 radii
 BUILDERS = [smoke, ash]
 
 
+@functools.cache
 def ash_mie(wavelength_um):
     """Mie theory for the ash of the table: extinction efficiency, ssa, asymmetry. [-]"""
     log_width = np.log(2.0)
@@ -27,7 +31,7 @@ def ash_mie(wavelength_um):
     return area @ q_ext, area @ q_sca / (area @ q_ext), area @ (q_sca * g) / (area @ q_sca)
 
 
-@pytest.mark.parametrize("band", ["C03", "C06"])
+@pytest.mark.parametrize("band", ["C03", "C04", "C05", "C06", "C07"])
 def test_ash_optics_are_those_of_mie_theory(band):
     at_550, _, _ = ash_mie(0.550)
     extinction, ssa, asymmetry = ash_mie(BANDS[band].wavelength_um)
@@ -50,6 +54,13 @@ def test_optical_depth_and_defaults(build):
     np.testing.assert_allclose(plume.aod_550, 0.3)
     assert tuple(plume.ssa) == GRASSO2013
     assert all(leaf.shape == () for leaf in jax.tree.leaves(plume))
+
+
+@pytest.mark.parametrize("build", BUILDERS)
+def test_every_band_can_be_asked_for(build):
+    plume = build(bands=tuple(BANDS))
+    for optics in (plume.relative_extinction, plume.ssa, plume.asymmetry):
+        assert set(optics) == set(BANDS)
 
 
 @pytest.mark.parametrize("build", BUILDERS)
@@ -107,4 +118,49 @@ def test_traced_numbers_pass_and_differentiate(mode):
 @pytest.mark.parametrize("build", BUILDERS)
 def test_dtype_follows_the_arrays_given(build):
     plume = build(jnp.float32(0.4), brightness=0.5)
+    assert all(leaf.dtype == jnp.float32 for leaf in jax.tree.leaves(plume))
+
+
+def spheres(**changed):
+    extent = dict(aod_550=0.6, effective_radius_um=2.0, base=1000.0, top=3000.0)
+    return mie_plume("ash", **(extent | changed))
+
+
+def test_plume_of_spheres():
+    plume = spheres(brightness=np.array([0.0, 0.5]))
+    assert plume.species == "ash"
+    assert all(leaf.shape == (2,) for leaf in jax.tree.leaves(plume))
+    np.testing.assert_allclose(plume.aod_550, [0, 0.3])
+    np.testing.assert_allclose(plume.extinction_550, 3e-4)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (dict(top=1000.0), "top of ash must be above base"),
+        (dict(aod_550=-0.1), "aod_550 of ash must be 0 or more"),
+        (dict(brightness=-0.5), "brightness of ash must be 0 or more"),
+        (dict(effective_radius_um=np.zeros(2)), "effective_radius_um of ash must be above 0"),
+        (dict(effective_radius_um=float("nan")), "effective_radius_um of ash must be above 0"),
+    ],
+)
+def test_numbers_of_spheres_out_of_range_are_named(wrong, message):
+    with pytest.raises(ValueError, match=message):
+        spheres(**wrong)
+
+
+def test_species_without_a_table_is_named():
+    with pytest.raises(ValueError, match="no Mie table of species 'fog'"):
+        mie_plume("fog", 1.0, 2.0, base=0.0, top=1.0)
+
+
+@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
+def test_traced_numbers_of_spheres_pass_and_differentiate(mode):
+    derivative = mode(lambda radius: spheres(effective_radius_um=radius).effective_radius_um)(2.0)
+    np.testing.assert_allclose(derivative, 1)
+
+
+@pytest.mark.float32
+def test_dtype_of_spheres_follows_the_arrays_given():
+    plume = spheres(effective_radius_um=jnp.float32(2.0))
     assert all(leaf.dtype == jnp.float32 for leaf in jax.tree.leaves(plume))

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.bands import BANDS, GRASSO2013
+from abi_operator.bands import BANDS
 from abi_operator.optics.water import (
     ASYMMETRY,
     EFFECTIVE_RADIUS_UM,
@@ -19,17 +19,18 @@ MIE = 1e-3  # of interpolation between the radii of the table, and of the sums o
 ENDS = (EFFECTIVE_RADIUS_UM[0], EFFECTIVE_RADIUS_UM[-1])
 
 
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", BANDS)
 def test_refractive_index_is_segelsteins(band):
     table = files("miepython").joinpath("data/segelstein81_index.txt").read_text()
     wavelength, n, k = np.loadtxt(table.splitlines()[4:]).T
     centroid, index = BANDS[band].wavelength_um, REFRACTIVE_INDEX[band]
     np.testing.assert_allclose(index.real, np.interp(centroid, wavelength, n), atol=1e-4)
     log_k = np.interp(np.log(centroid), np.log(wavelength), np.log(k))
-    np.testing.assert_allclose(-index.imag, np.exp(log_k), rtol=1e-3)
+    # The two copies of the table differ in their last digits, by 2e-3 in k at most (C05).
+    np.testing.assert_allclose(-index.imag, np.exp(log_k), rtol=2.5e-3)
 
 
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", BANDS)
 def test_asymmetry_against_mie(droplet_mie, band):
     radii = [2.5, 2.7, 3.2, 4.0, 4.25, 5.5, 7.5, 10.0, 13.5, 25.0, 35.0, 40.0]
     expected = [droplet_mie(band, radius)[2] for radius in radii]
@@ -37,7 +38,7 @@ def test_asymmetry_against_mie(droplet_mie, band):
     np.testing.assert_allclose(value, expected, rtol=0, atol=MIE)
 
 
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", BANDS)
 def test_asymmetry_passes_through_the_table_and_is_constant_beyond(band):
     radii = np.array([0.5, *EFFECTIVE_RADIUS_UM, 200.0])
     table = ASYMMETRY[band]
@@ -45,9 +46,9 @@ def test_asymmetry_passes_through_the_table_and_is_constant_beyond(band):
     np.testing.assert_allclose(droplet_asymmetry(jnp.asarray(radii), band), expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", BANDS)
 def test_slope_is_continuous_and_zero_at_the_ends(band):
-    slope = jax.vmap(jax.grad(lambda radius: droplet_asymmetry(radius, band)))
+    slope = jax.jit(jax.vmap(jax.grad(lambda radius: droplet_asymmetry(radius, band))))
     nodes, nearby = np.asarray(EFFECTIVE_RADIUS_UM, float), 1e-9
     below, above = slope(nodes * (1 - nearby)), slope(nodes * (1 + nearby))
     # The second derivative times the distance between the two points is what may differ.
@@ -56,7 +57,7 @@ def test_slope_is_continuous_and_zero_at_the_ends(band):
 
 
 @pytest.mark.float32
-@pytest.mark.parametrize("band", GRASSO2013)
+@pytest.mark.parametrize("band", BANDS)
 def test_float32_stays(band):
     value = droplet_asymmetry(jnp.asarray(EFFECTIVE_RADIUS_UM, jnp.float32), band)
     assert value.dtype == jnp.float32

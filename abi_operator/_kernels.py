@@ -1,0 +1,87 @@
+"""Many small operations compiled to one piece of machine code.
+
+To start a kernel takes a CPU as long as the arithmetic of 2 x 2 or 4 x 4 matrices on a tile of
+columns, and a layer has a hundred kernels. XLA compiles a call marked ``xla_cpu_small_call`` whole,
+as it does the smallest loops of any program; other backends do not know the mark.
+
+The call is a primitive of its own, because a `jax.jit` is taken apart where derivatives are: into
+what is known and what is not, piece by piece, of which XLA then makes no kernel.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax.experimental.xla_metadata import set_xla_metadata
+from jax.extend.core import ClosedJaxpr, Primitive, jaxpr_as_fun
+from jax.interpreters import ad, batching, mlir
+
+_LARGEST = 8
+
+_one_kernel = Primitive("one_kernel")
+_one_kernel.multiple_results = True
+
+
+def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., Any]:
+    """`function`, of matrices with `num_nodes` rows and a tile of columns, as one kernel.
+
+    XLA has neither code in it for a ``dot`` nor for an operation that it would share among threads:
+    one on half a megabyte, or of more arithmetic than bytes on 20 kilobytes. Up to 8 rows and the
+    tiles of `_batching` nothing comes near; with more, `function` is left as it is. So are its
+    derivatives, and what `jax.vmap` makes of it, in which nobody has counted.
+
+    Parameters
+    ----------
+    function
+        Of pytrees of arrays, to a pytree of arrays. It must not close over traced arrays.
+    num_nodes
+        Rows of the matrices.
+    """
+    if num_nodes > _LARGEST:
+        return function
+
+    def call(*args: Any) -> Any:
+        leaves, structure = jax.tree.flatten(args)
+
+        def flat(*leaves: Any) -> Any:
+            return function(*jax.tree.unflatten(structure, leaves))
+
+        jaxpr, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
+        return jax.tree.unflatten(jax.tree.structure(shape), _one_kernel.bind(*leaves, jaxpr=jaxpr))
+
+    return call
+
+
+@_one_kernel.def_impl
+def _impl(*leaves: Any, jaxpr: ClosedJaxpr) -> Any:
+    return jax.jit(lambda *x: _one_kernel.bind(*x, jaxpr=jaxpr))(*leaves)
+
+
+@_one_kernel.def_abstract_eval
+def _abstract_eval(*_: Any, jaxpr: ClosedJaxpr) -> Any:
+    return jaxpr.out_avals
+
+
+def _marked(*leaves: Any, jaxpr: ClosedJaxpr) -> Any:
+    compiled = jax.jit(jaxpr_as_fun(jaxpr))
+    with set_xla_metadata(inlineable="false", xla_cpu_small_call="true"):
+        return compiled(*leaves)
+
+
+def _jvp(primals: Any, tangents: Any, *, jaxpr: ClosedJaxpr) -> Any:
+    tangents = [
+        jnp.zeros_like(x) if isinstance(t, ad.Zero) else t
+        for x, t in zip(primals, tangents, strict=True)
+    ]
+    return jax.jvp(jaxpr_as_fun(jaxpr), tuple(primals), tuple(tangents))
+
+
+def _batch(leaves: Any, axes: Any, *, jaxpr: ClosedJaxpr) -> Any:
+    mapped = jax.vmap(jaxpr_as_fun(jaxpr), axes)(*leaves)
+    return mapped, [0] * len(mapped)
+
+
+mlir.register_lowering(_one_kernel, mlir.lower_fun(_marked, multiple_results=True))
+ad.primitive_jvps[_one_kernel] = _jvp
+batching.primitive_batchers[_one_kernel] = _batch

@@ -1,0 +1,75 @@
+r"""Scattering by ice crystals, in the fits of Fu (1996).
+
+The fits are in the generalized effective size of hexagonal columns with smooth faces, random in
+their orientation. Crystals of real anvils are rough, and scatter less forwards: the asymmetry
+factor of severely roughened aggregates of columns is 0.75 in the visible at nearly any size (Yang
+et al. [1]_; the ice of MODIS collection 6), `ROUGHENED_ASYMMETRY`.
+
+References
+----------
+.. [1] P. Yang et al., "Spectrally consistent scattering, absorption, and polarization properties of
+   atmospheric ice crystals at wavelengths from 0.2 to 100 um", J. Atmos. Sci., 70, 330-347, 2013,
+   doi:10.1175/JAS-D-12-039.1
+"""
+
+import math
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .ice_tables import FU, FU_RANGE_UM
+
+# Asymmetry factor of severely roughened aggregates of columns, in the visible. [-]
+ROUGHENED_ASYMMETRY = 0.75
+# Generalized effective size over mean photon path. [-] (Fu 1996: D = 2 IWC / (sqrt 3 rho A))
+SIZE_PER_PATH = 2 / math.sqrt(3)
+# Sizes within which the fit is bent towards its end. [um]
+_BEND_UM = 5.0
+
+
+def fitted_size(size_um: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """Size at which the fits are read: the size itself, tending to the ends of their range. [um]
+
+    Within 5 um of an end of 20-130 um, and beyond it, the distance to the end decays exponentially,
+    with a slope that is continuous.
+
+    Parameters
+    ----------
+    size_um
+        Generalized effective size. [um]
+    """
+    lower, upper = FU_RANGE_UM[0] + _BEND_UM, FU_RANGE_UM[1] - _BEND_UM
+    small, large = size_um < lower, size_um > upper
+    # Each exponential sees only the sizes that it is for.
+    below = jnp.exp((jnp.where(small, size_um, lower) - lower) / _BEND_UM)
+    above = jnp.exp((upper - jnp.where(large, size_um, upper)) / _BEND_UM)
+    ends = jnp.where(small, lower - _BEND_UM * (1 - below), upper + _BEND_UM * (1 - above))
+    return jnp.where(small | large, ends, size_um)
+
+
+def ice_asymmetry(size_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+    """Asymmetry factor of smooth hexagonal columns. [-]
+
+    Parameters
+    ----------
+    size_um
+        Generalized effective size, above 0. [um]
+    band
+        Name of the band.
+    """
+    return _cubic(FU[band].asymmetry, fitted_size(size_um))
+
+
+def ice_coalbedo(size_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+    """1 - ssa of smooth hexagonal columns; parameters as in `ice_asymmetry`. [-]"""
+    return _cubic(FU[band].coalbedo, fitted_size(size_um))
+
+
+def ice_mass_extinction(size_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+    """Extinction cross-section per mass of ice; parameters as in `ice_asymmetry`. [m2 kg-1]"""
+    a0, a1 = FU[band].extinction
+    return 1e3 * (a0 + a1 / fitted_size(size_um))
+
+
+def _cubic(c: tuple[float, float, float, float], x: Array) -> Array:
+    return c[0] + x * (c[1] + x * (c[2] + x * c[3]))

@@ -1,0 +1,68 @@
+"""Optics of aerosols of spheres, as a function of their effective radius."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .mie_table import mie_table
+from .water import interpolate
+
+
+class MieOptics(NamedTuple):
+    """Optics of one species in one band.
+
+    Parameters
+    ----------
+    relative_extinction
+        Extinction relative to that at 550 nm. [-]
+    coalbedo
+        1 minus the single-scattering albedo. [-]
+    asymmetry
+        Mean cosine of the scattering angle. [-]
+    """
+
+    relative_extinction: Float[Array, "*n"]
+    coalbedo: Float[Array, "*n"]
+    asymmetry: Float[Array, "*n"]
+
+
+def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: str) -> MieOptics:
+    r"""Optics of lognormal distributions of spheres, from the table of their species.
+
+    Extinction is per volume of particles, :math:`\int Q\, \pi r^2\, n(r)\, dr / \int r^3\, n\, dr`,
+    over the same at 550 nm, so that the optical depth at 550 nm stays what a plume says it is when
+    the radius varies. Between the radii of the table the logarithms of extinction and co-albedo and
+    the asymmetry factor are cubics in the logarithm of radius with a continuous slope. At the ends
+    of the table the slope is zero, and beyond them all is constant. Over the first and the last
+    interval the slope fades: the table is meant for what lies between, for smoke fine modes of
+    0.043-0.56 um (its coarse mode stays as it is, in fixed proportion by volume) and for ash
+    0.28-17.9 um; for any species, from the second to the last but one radius of its `mie_table`.
+
+    Parameters
+    ----------
+    species
+        Name of the species, of those in `mie_species`.
+    effective_radius_um
+        Effective radius. [um]
+    band
+        Name of the band.
+
+    References
+    ----------
+    .. [1] G. Mie, "Beitraege zur Optik trueber Medien, speziell kolloidaler Metalloesungen", Ann.
+       Phys., 330, 377-445, 1908, doi:10.1002/andp.19083300302
+    """
+    table = mie_table(species)
+    if band not in table.asymmetry:
+        raise ValueError(
+            f"no Mie table of {species!r} in band {band!r}; choose from {list(table.asymmetry)}."
+        )
+    nodes = table.effective_radius_um
+    # Held before its logarithm is taken: optics and derivatives are finite even at a radius of 0.
+    radius = jnp.maximum(effective_radius_um, nodes[0])
+    return MieOptics(
+        jnp.exp(interpolate(radius, nodes, table.log_relative_extinction[band])),
+        jnp.exp(interpolate(radius, nodes, table.log_coalbedo[band])),
+        interpolate(radius, nodes, table.asymmetry[band]),
+    )

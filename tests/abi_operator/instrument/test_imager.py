@@ -1,0 +1,219 @@
+"""The whole instrument: its order, and at which temperature a fire saturates it."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator.instrument import (
+    Imager,
+    Observation,
+    calibration_gain,
+    footprint_mean,
+    hard_ceiling,
+    image_mean,
+    observe,
+    observe_mean,
+    overlap_lengths,
+    range_ceiling,
+)
+from abi_operator.planck import brightness_temperature, in_band_radiance
+
+CELLS = 25  # cells of 400 m in a pixel of 2 km
+WEIGHTS = jnp.full(CELLS, 0.16)  # their area [km2]
+GROUND = 300.0
+seen_by = jax.jit(observe, static_argnums=2)
+
+
+def burning(temperature, band="C07", satellite="GOES-16"):
+    """One black cell at `temperature` among 24 at 300 K, without air and sun."""
+    cells = jnp.full(CELLS, GROUND).at[0].set(temperature)
+    return in_band_radiance(cells, band, satellite)
+
+
+def saturation_temperature(band, imager):
+    """Temperature at which one burning cell saturates the pixel, by bisection. [K]"""
+    saturated = jax.jit(lambda t: observe(burning(t, band), WEIGHTS, band, imager).saturated)
+    low, high = 400.0, 1500.0
+    while high - low > 0.01:
+        middle = (low + high) / 2
+        low, high = (low, middle) if saturated(middle) else (middle, high)
+    return high
+
+
+def test_radiance_is_averaged_before_it_is_limited():
+    cells = burning(750.0)
+    right = seen_by(cells, WEIGHTS, "C07")
+    assert right.saturated
+    np.testing.assert_allclose(right.brightness_temperature, 411.86, atol=0.01)
+    # Limiting the cells first would hide the fire: one cell of 412 K among 24 of 300 K.
+    wrong = footprint_mean(hard_ceiling(cells, range_ceiling("C07")), WEIGHTS)
+    np.testing.assert_allclose(brightness_temperature(wrong, "C07"), 319, atol=1)
+
+
+@pytest.mark.parametrize(
+    ("band", "imager", "expected", "tolerance"),
+    [
+        ("C07", Imager(), 638, 3),
+        ("C07", Imager(fire_saturation_temperature=400.0), 609, 3),
+        ("C06", Imager(), 808, 5),
+    ],
+)
+def test_fire_that_saturates_one_pixel(band, imager, expected, tolerance):
+    assert saturation_temperature(band, imager) == pytest.approx(expected, abs=tolerance)
+
+
+def test_a_whole_pixel_saturates_at_the_ceiling():
+    cells = in_band_radiance(jnp.full(CELLS, 405.0), "C07")
+    open_, paper = (
+        seen_by(cells, WEIGHTS, "C07", Imager(fire_saturation_temperature=t)) for t in (None, 400.0)
+    )
+    assert not open_.saturated and paper.saturated
+    np.testing.assert_allclose(open_.brightness_temperature, 405, rtol=1e-12)
+    np.testing.assert_allclose(paper.brightness_temperature, 400, rtol=1e-12)
+
+
+@pytest.mark.parametrize("band", ["C01", "green", "C06"])
+def test_reflective_bands_report_the_reflectance_factor(band):
+    value = seen_by(jnp.array([10.0, 20.0]), jnp.array([3.0, 1.0]), band, sun_distance=1.01)
+    assert isinstance(value, Observation) and value.brightness_temperature is None
+    np.testing.assert_allclose(value.radiance, 12.5, rtol=1e-15)
+    irradiance = {"C01": 2017.1648, "green": 1871.5, "C06": 76.8999}[band]
+    np.testing.assert_allclose(
+        value.reflectance_factor, np.pi * 1.01**2 * 12.5 / irradiance, rtol=1e-14
+    )
+    assert not value.saturated
+
+
+def test_noise_comes_before_the_ceiling_and_the_ceiling_before_the_counts():
+    imager = Imager(quantised=True)
+    keys = jax.random.split(jax.random.key(7), 200)
+    bright = jnp.full(3, range_ceiling("C06"))
+    pixel = jax.jit(jax.vmap(lambda key: observe(bright, jnp.ones(3), "C06", imager, key=key)))
+    noisy = pixel(keys)
+    # Half of the draws lie above the range; none is reported so.
+    assert 60 < noisy.saturated.sum() < 140
+    ceiling = range_ceiling("C06")
+    assert noisy.radiance.max() <= ceiling * (1 + 1e-14)
+    counts = (noisy.radiance + 0.9609507) / 0.030088475
+    np.testing.assert_allclose(counts, jnp.round(counts), atol=1e-9)
+
+
+def test_pixels_share_the_calibration_error_and_not_the_noise():
+    cells = jnp.broadcast_to(jnp.linspace(10.0, 20.0, 4), (6, 4))
+    keys = jax.random.split(jax.random.key(1), 6)
+    weights, common = jnp.ones(4), jax.random.key(2)
+    gained = jax.vmap(lambda x: observe(x, weights, "C05", calibration_key=common))
+    clean = jax.jit(gained)(cells)
+    np.testing.assert_allclose(clean.radiance, 15 * calibration_gain("C05", common), rtol=1e-14)
+    noisy = jax.jit(jax.vmap(lambda x, key: observe(x, weights, "C05", key=key)))(cells, keys)
+    assert len(np.unique(noisy.radiance)) == 6
+
+
+def test_no_noise_unless_asked():
+    cells = burning(500.0)
+    a, b = (seen_by(cells, WEIGHTS, "C07") for _ in range(2))
+    np.testing.assert_array_equal(a.radiance, b.radiance)
+    np.testing.assert_allclose(a.radiance, footprint_mean(cells, WEIGHTS), rtol=1e-15)
+
+
+def test_an_image_is_its_pixels():
+    cells = in_band_radiance(jnp.linspace(280.0, 700.0, 100).reshape(10, 10), "C07")
+    lengths = overlap_lengths(jnp.arange(11.0) * 400, jnp.arange(3.0) * 2000)
+    imager = Imager(quantised=True)
+    whole = jax.jit(lambda x: observe_mean(image_mean(x, lengths, lengths), "C07", imager))
+    image = whole(cells)
+    blocks = cells.reshape(2, 5, 2, 5).swapaxes(1, 2).reshape(4, CELLS)
+    pixels = jax.jit(jax.vmap(lambda x: observe(x, WEIGHTS, "C07", imager)))(blocks)
+    assert 0 < pixels.saturated.sum() < 4
+    np.testing.assert_array_equal(image.saturated.ravel(), pixels.saturated)
+    np.testing.assert_allclose(image.radiance.ravel(), pixels.radiance, rtol=1e-12)
+    np.testing.assert_allclose(
+        image.brightness_temperature.ravel(), pixels.brightness_temperature, rtol=1e-12
+    )
+
+
+def test_vmap_is_a_loop():
+    temperatures = jnp.array([300.0, 500.0, 700.0, 900.0])
+    imager = Imager("GOES-18", ceiling_width=0.1)
+
+    @jax.jit
+    def pixel(temperature):
+        return observe(burning(temperature, satellite="GOES-18"), WEIGHTS, "C07", imager)
+
+    batch = jax.vmap(pixel)(temperatures)
+    for i, temperature in enumerate(temperatures):
+        jax.tree.map(
+            lambda one, all_, i=i: np.testing.assert_allclose(one, all_[i], rtol=1e-14),
+            pixel(temperature),
+            batch,
+        )
+
+
+@pytest.mark.parametrize(
+    ("temperature", "imager", "seen"),
+    [
+        (500.0, Imager(), True),
+        (700.0, Imager(), False),
+        (700.0, Imager(ceiling_width=0.2), True),
+        (500.0, Imager(quantised=True), False),
+    ],
+)
+def test_derivative_with_respect_to_the_fire(temperature, imager, seen):
+    key = jax.random.key(9)
+
+    def function(t):
+        return observe(burning(t), WEIGHTS, "C07", imager, key=key).brightness_temperature
+
+    @jax.jit
+    def derivatives(point):
+        _, forward = jax.jvp(function, (point,), (jnp.ones_like(point),))
+        central = (function(point + 1e-3) - function(point - 1e-3)) / 2e-3
+        return forward, jax.grad(function)(point), central
+
+    forward, back, central = derivatives(jnp.asarray(temperature))
+    np.testing.assert_allclose(back, forward, rtol=1e-12)
+    assert (forward > 1e-3) == seen
+    if not imager.quantised:
+        np.testing.assert_allclose(forward, central, rtol=1e-6, atol=1e-12)
+
+
+def test_derivative_with_respect_to_settings():
+    cells = burning(700.0)
+
+    @jax.jit
+    def function(width, temperature):
+        imager = Imager(fire_saturation_temperature=temperature, ceiling_width=width)
+        return observe(cells, WEIGHTS, "C07", imager).radiance
+
+    width, temperature = jnp.asarray(0.1), jnp.asarray(400.0)
+    gradient = jax.grad(function, (0, 1))(width, temperature)
+    for i, step in enumerate((1e-5, 1e-3)):
+        ends = [
+            function(width + sign * step * (i == 0), temperature + sign * step * (i == 1))
+            for sign in (1, -1)
+        ]
+        np.testing.assert_allclose(gradient[i], (ends[0] - ends[1]) / (2 * step), rtol=1e-6)
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize(("band", "width"), [("C06", None), ("C07", 0.1)])
+def test_float32_stays(band, width):
+    imager = Imager(fire_saturation_temperature=400.0, ceiling_width=width, quantised=True)
+    cells = in_band_radiance(jnp.full(CELLS, 350.0, jnp.float32), band)
+    weights, key = jnp.ones(CELLS, jnp.float32), jax.random.key(1)
+    pixel = jax.jit(lambda x: observe(x, weights, band, imager, sun_distance=1.01, key=key))
+    value = pixel(cells)
+    leaves = [x for x in jax.tree.leaves(value) if x.dtype != bool]
+    assert len(leaves) == 2 and all(x.dtype == jnp.float32 for x in leaves)
+
+
+def test_errors_name_what_came():
+    with pytest.raises(ValueError, match="'C13'"):
+        observe(jnp.ones(2), jnp.ones(2), "C13")
+    with pytest.raises(ValueError, match="satellite 'GOES-15' is not known"):
+        Imager("GOES-15")
+    with pytest.raises(ValueError, match=r"radiance.shape=\(3,\) and weights.shape=\(2,\)"):
+        observe(jnp.ones(3), jnp.ones(2), "C01")
+    with pytest.raises(ValueError, match="floor is not specified in band 'green'"):
+        observe(jnp.ones(2), jnp.ones(2), "green", key=jax.random.key(0))

