@@ -1,14 +1,17 @@
 """Differentiable synthetic imagery of the GOES-R Advanced Baseline Imager.
 
-With this package you write down what a column of the atmosphere holds (`State`: air, droplets,
-smoke, ash, a ground, a sun and a satellite) and get the reflectance that the imager would see in
-each band, `reflectance_factor` or `brf`, with exact derivatives by `jax.jacfwd`, `jax.jacrev` and
-`jax.grad` with respect to everything in the state. `abi_operator.solver` is the radiative transfer
-on its own; `abi_operator.files` and `abi_operator.scene` turn model output on disk into images.
+With this package you write down what a column of the atmosphere holds (`State`: air, gases,
+droplets and other particles, smoke, ash, a ground, a fire, a sun and a satellite) and get what the
+imager would see in each band: `reflectance_factor` or `brf` of sunlight, `radiance` where heat
+shines too. Exact derivatives with respect to everything in the state come by `jax.jacfwd`,
+`jax.jacrev` and `jax.grad`. `abi_operator.solver` is the radiative transfer on its own;
+`abi_operator.instrument` makes of radiances what a file would hold; `abi_operator.files` and
+`abi_operator.scene` turn model output on disk into images.
 """
 
 from ._version import __version__ as __version__
 from .atmosphere import Atmosphere as Atmosphere
+from .atmosphere import Fire as Fire
 from .atmosphere import Gases as Gases
 from .atmosphere import Hydrometeor as Hydrometeor
 from .atmosphere import LiquidCloud as LiquidCloud
@@ -21,6 +24,8 @@ from .geometry import Geometry as Geometry
 from .optics import ash as ash
 from .optics import mie_plume as mie_plume
 from .optics import smoke as smoke
+from .radiance import brightness_temperature as brightness_temperature
+from .radiance import radiance as radiance
 from .reflectance import brf as brf
 from .reflectance import reflectance_factor as reflectance_factor
 from .standard_atmospheres import standard_atmosphere as standard_atmosphere

@@ -156,6 +156,21 @@ class Atmosphere(eqx.Module):
     hydrometeors: dict[str, Hydrometeor] = eqx.field(default_factory=dict)
 
 
+class Fire(eqx.Module):
+    """A fire that is smaller than a column.
+
+    Parameters
+    ----------
+    fraction
+        Share of the column's ground that burns, 0 to 1. [-]
+    temperature
+        Of the flames. [K]
+    """
+
+    fraction: Float[Array, "*batch"]
+    temperature: Float[Array, "*batch"]
+
+
 class State(eqx.Module):
     """All that the operator needs to know of one column.
 
@@ -167,8 +182,14 @@ class State(eqx.Module):
         Lambertian (white-sky) albedo of the ground by band. [-]
     geometry
         Directions of the sun and of the satellite.
+    surface_temperature
+        Of the ground that does not burn; None where no emission is to be simulated. [K]
+    fire
+        None where nothing burns.
     """
 
     atmosphere: Atmosphere
     albedo: dict[str, Float[Array, "*batch"]]
     geometry: Geometry
+    surface_temperature: Float[Array, "*batch"] | None = None
+    fire: Fire | None = None

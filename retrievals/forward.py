@@ -56,9 +56,8 @@ def plume_by_band(state: State, species: str) -> Plume:
     """The plume of a species, or `ValueError` if its optics are not specified by band."""
     plume = state.atmosphere.plumes[species]
     if not isinstance(plume, Plume):
-        raise ValueError(
-            f"{species!r} must be a Plume to be retrieved; got {type(plume).__name__}."
-        )
+        kind = type(plume).__name__
+        raise ValueError(f"to be retrieved, {species!r} must be a Plume; got a {kind}.")
     return plume
 
 

@@ -28,7 +28,8 @@ class Noise(eqx.Module):
 
     The defaults of a and b give the signal-to-noise ratio of 300 that is required at a reflectance
     factor of 1 [1]_ and the 57 that was measured in C02 at 0.05 [2]_, and are used for all six
-    bands; the noise in C07 is the 0.1 K required at 300 K [1]_.
+    bands; the noise in C07 is the 0.1 K required at 300 K [1]_. The 3 % of the calibration is an
+    assumption, a round figure to be replaced.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ class Noise(eqx.Module):
 
 
 NOISE = Noise()
-"""The noise of the requirements and of the measurements that `Noise` names."""
+"""The noise of the requirements and of the measurement that `Noise` names."""
 
 
 def noise_deviation(

@@ -147,7 +147,7 @@ SCHEMES: dict[str, dict[str, SizeDistribution]] = {
         "graupel": _by_slope(sphere(500.0), 0.0, ThompsonGraupel(), 50e-6 / 3.672, 25.4e-3 / 3.672),
     },
     "morrison": {
-        "cloud": _droplets(4.82, 2.5e8),  # the shape of 250 droplets cm-3 (`droplet_shape`)
+        "cloud": _droplets(4.83, 2.5e8),  # the shape of 250 droplets cm-3 (`droplet_shape`)
         "rain": _by_slope(sphere(997.0), 0.0, Predicted(), 20e-6, 2800e-6),
         "ice": _by_slope(sphere(500.0), 0.0, Predicted(), 1e-6, 350e-6),
         "snow": _by_slope(sphere(100.0), 0.0, Predicted(), 10e-6, 2000e-6),

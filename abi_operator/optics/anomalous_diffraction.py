@@ -40,8 +40,9 @@ import math
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jax.scipy.special import gammaln
 from jaxtyping import Array, Float
+
+from ..microphysics.gamma import log_moment
 
 EDGE = 2.0  # strength of the edge effect, a6 [-]
 EDGE_RATE = 0.06  # its growth with size parameter [-]
@@ -116,9 +117,8 @@ def mean_efficiencies(
 
 def _gamma_ratio(q: float, nu: float | Array) -> float | Array:
     """Gamma(nu + 3 + q) / Gamma(nu + 3)."""
-    if isinstance(nu, float | int):
-        return math.exp(math.lgamma(nu + 3 + q) - math.lgamma(nu + 3))
-    return jnp.exp(gammaln(nu + 3 + q) - gammaln(nu + 3))
+    log_ratio = log_moment(q, nu + 2)
+    return math.exp(log_ratio) if isinstance(log_ratio, float) else jnp.exp(log_ratio)
 
 
 def _mean_loss(q: float, z: Array, rate: Array, nu: float | Array) -> Array:

@@ -16,7 +16,7 @@ from ..optical_properties import OpticalProperties, Scatterer
 from . import rain, water
 from .anomalous_diffraction import mean_efficiencies
 from .cloud import liquid_cloud
-from .droplets import effective_radius
+from .droplets import LARGEST_RADIUS, NU, SMALLEST_RADIUS, effective_radius
 from .gamma import Habit, equivalent_shape, mean_mass_of_path, photon_path, sphere_habit
 from .ice import (
     ROUGHENED_ASYMMETRY,
@@ -93,7 +93,7 @@ def _ice(habit: str, nu: float, largest_radius: float) -> ClassOptics:
 
 
 CLASSES: dict[str, ClassOptics] = {
-    "cloud": ClassOptics("drops", 7.0, 1e-6, 1e-4, "droplets"),
+    "cloud": ClassOptics("drops", NU, SMALLEST_RADIUS, LARGEST_RADIUS, "droplets"),
     "drizzle": ClassOptics("drops", 1.0, 1e-5, 1e-3, "rain"),
     "rain": ClassOptics("drops", 0.0, 1e-5, 5e-3, "rain"),
     "ice": _ice("columns", 0.0, 5e-4),

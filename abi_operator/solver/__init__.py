@@ -21,8 +21,8 @@ from .phase_table import normalise_table as normalise_table
 from .quadrature import double_gauss as double_gauss
 from .single_scatter import cos_scattering_angle as cos_scattering_angle
 from .slant_path import slant_path_secant as slant_path_secant
-from .surface import Lambertian as Lambertian
 from .surface import AnySurface as AnySurface
+from .surface import Lambertian as Lambertian
 from .surface import Surface as Surface
 from .toa_brf import toa_brf as toa_brf
 from .toa_radiance import toa_radiance as toa_radiance

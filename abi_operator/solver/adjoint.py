@@ -260,29 +260,29 @@ def _mode(
     """Reflection of a mode, and the slopes of `weight` times it.
 
     `kept` is room for what is kept of all layers, given back filled: modes that share it do not
-    clear it, nor copy it, one after the other.
+    clear it, nor copy it, one after the other. Layers are read and written inside the kernels: as
+    inputs and outputs of a scan every array would be one more kernel a layer.
     """
-
     num_nodes = layers.even.shape[1]
 
     def put_on(stack, layer, kernels, view_secant):
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return climb(stack, a, p, layer.tau, num_doublings)
 
-    put_on = one_kernel(put_on, num_nodes)
+    @partial(one_kernel, num_nodes=num_nodes)
+    def put_on_and_keep(stack, kept, layers, number, kernels, view_secant):
+        stack, new = put_on(stack, _one_of(layers, number), kernels, view_secant)
+        return stack, _with_one(kept, number, new)
 
-    def up(carry, x):
-        (stack, kept), (layer, number) = carry, x
-        stack, new = put_on(stack, layer, kernels, view_secant)
-        write = partial(jax.lax.dynamic_update_index_in_dim, index=number, axis=0)
-        return (stack, jax.tree.map(write, kept, new)), None
+    def up(carry, number):
+        return put_on_and_keep(*carry, layers, number, kernels, view_secant), None
 
-    numbers = jnp.arange(layers.tau.shape[0])
+    numbers = jnp.arange(layers.tau.shape[0], dtype=layers.tau.dtype)
     if kept is None:
-        one = jax.tree.map(lambda x: x[0], layers)
-        shapes = jax.eval_shape(lambda: put_on(ground, one, kernels, view_secant)[1])
+        first = _one_of(layers, 0)
+        shapes = jax.eval_shape(lambda: put_on(ground, first, kernels, view_secant)[1])
         kept = jax.tree.map(lambda x: jnp.zeros((numbers.size, *x.shape), x.dtype), shapes)
-    (stack, kept), _ = jax.lax.scan(up, (ground, kept), (layers, numbers), reverse=True)
+    (stack, kept), _ = jax.lax.scan(up, (ground, kept), numbers, reverse=True)
     reflection, fields = _fields_at_the_top(stack, weight)
 
     def undo(fields, totals, layer, kept, kernels, view_secant):
@@ -297,16 +297,40 @@ def _mode(
         step = 0.5 / 2**num_doublings
         return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
 
-    undo = one_kernel(undo, num_nodes)
+    @partial(one_kernel, num_nodes=num_nodes)
+    def undo_one(carry, layers, kept, number, kernels, view_secant):
+        fields, totals, slopes = carry
+        layer, own = _one_of((layers, kept), number)
+        fields, totals, new = undo(fields, totals, layer, own, kernels, view_secant)
+        return fields, totals, _with_one(slopes, number, new)
 
-    def down(carry, x):
-        (fields, totals), (layer, kept) = carry, x
-        fields, totals, slopes = undo(fields, totals, layer, kept, kernels, view_secant)
-        return (fields, totals), slopes
+    def down(carry, number):
+        return undo_one(carry, layers, kept, number, kernels, view_secant), None
 
     start = tuple(jnp.zeros_like(x) for x in (kernels[0].beams, kernels[1].beams, view_secant))
-    (fields, (even, odd, view)), slopes = jax.lax.scan(down, (fields, start), (layers, kept))
+    slopes = jax.tree.map(jnp.zeros_like, layers)
+    carry, _ = jax.lax.scan(down, (fields, start, slopes), numbers)
+    fields, (even, odd, view), slopes = carry
     return reflection, kept, _Slopes(slopes, even, odd, view, pair(1.0, fields))
+
+
+def _one_of(stacks: Any, number: Any) -> Any:
+    """What arrays with one entry a layer hold of a layer.
+
+    `number` is not of integers, which have no tangents to go through `one_kernel` with.
+    """
+    read = partial(jax.lax.dynamic_index_in_dim, index=_integer(number), axis=0, keepdims=False)
+    return jax.tree.map(read, stacks)
+
+
+def _with_one(stacks: Any, number: Any, new: Any) -> Any:
+    """The same arrays with `new` in place of that."""
+    write = partial(jax.lax.dynamic_update_index_in_dim, index=_integer(number), axis=0)
+    return jax.tree.map(write, stacks, new)
+
+
+def _integer(number):
+    return jnp.asarray(number).astype(jnp.int32)
 
 
 def _fields_at_the_top(stack: Bordered, weight):

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float, Int
 
 from .bordered import Bordered, Vector
 from .quadrature import double_gauss
-from .surface import Surface
+from .surface import AnySurface
 
 
 def isotropic(num_streams: int, beams: Float[Array, "beam *batch"]) -> Vector:
@@ -42,7 +42,7 @@ def black(beams: Float[Array, "beam *batch"], num_streams: int) -> Bordered:
 
 
 def reflecting(
-    surface: Surface,
+    surface: AnySurface,
     m: Int[Array, ""] | int,
     beams: Float[Array, "beam *batch"],
     num_streams: int,

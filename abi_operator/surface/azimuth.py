@@ -1,4 +1,4 @@
-r"""Azimuth modes of a reflectance: the quadratures over azimuth that the grounds share.
+r"""Azimuth modes of a reflectance, and what else of angles the grounds share.
 
 A reflectance is even and periodic in the relative azimuth, so that
 
@@ -11,6 +11,13 @@ Nodes and weights have the axis of azimuths first and may differ between pairs o
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
+
+from .._numerics import safe_sqrt
+
+
+def sine_of(mu: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """Sine of a zenith angle by its cosine; 0, with derivative 0, where that is 1. [-]"""
+    return safe_sqrt((1 - mu) * (1 + mu))
 
 
 def gauss_azimuths(count: int, like: Float[Array, "*n"]) -> tuple[Array, Array]:

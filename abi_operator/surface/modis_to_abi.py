@@ -17,10 +17,13 @@ class BandRegression(NamedTuple):
 _BAND5_UM, _BAND6_UM, _C04_UM = 1.24, 1.64, 1.3732
 _SHARE6 = (_C04_UM - _BAND5_UM) / (_BAND6_UM - _BAND5_UM)
 
-# Regressions over 600 canopies and soils simulated with PROSAIL, whose spectra were averaged over
-# the responses of Terra's MODIS and of GOES-16; standard errors 0.0001, 0.0012, 0.0011, 0.001 and
-# 0.0027 for C01, C02, C03, C05 and C06. "green" and Band4 share their centre. C04 is no regression
-# but lies on the line between its neighbours: water vapour hides the ground there. [-]
+# Regressions of this project over 600 canopies and soils simulated with PROSAIL (S. Jacquemoud et
+# al., "PROSPECT + SAIL models: a review of use for vegetation characterization", Remote Sens.
+# Environ., 113, S56-S66, 2009, doi:10.1016/j.rse.2008.01.026; Python package `prosail`), whose
+# spectra were averaged over the responses of Terra's MODIS and of GOES-16; standard errors 0.0001,
+# 0.0012, 0.0011, 0.001 and 0.0027 for C01, C02, C03, C05 and C06. "green" and Band4 share their
+# centre. C04 is no regression but lies on the line between its neighbours: water vapour hides the
+# ground there. [-]
 MODIS_TO_ABI: dict[str, BandRegression] = {
     "C01": BandRegression({"Band3": 1.0057}),
     "green": BandRegression({"Band4": 1.0}),
@@ -38,7 +41,7 @@ def modis_to_abi(modis: Mapping[str, Float[Array, "*n"]], band: str) -> Float[Ar
     .. math:: a = c_0 + \sum_i c_i\, a_i
 
     The regressions know vegetation and soil. They do not hold for snow, whose albedo falls steeply
-    between the near-infrared bands (at 2.24 um it is about 0.07, at 2.13 um about 0.02), nor
+    between the near-infrared bands (at 2.24 um it is about 0.07, at 2.13 um about 0.02 [1]_), nor
     for burnt or flooded ground without a check. What they give is not clipped: C05 falls below 0
     where Band5 is above 23 times Band6.
 
@@ -56,6 +59,11 @@ def modis_to_abi(modis: Mapping[str, Float[Array, "*n"]], band: str) -> Float[Ar
     ------
     ValueError
         If there is no regression for `band`, or a MODIS band that it needs is missing.
+
+    References
+    ----------
+    .. [1] D. E. Bowker et al., "Spectral reflectances of natural targets for use in remote sensing
+       studies", NASA Reference Publication 1139, 1985
     """
     if band not in MODIS_TO_ABI:
         raise ValueError(f"no regression on MODIS for band {band!r}; have {list(MODIS_TO_ABI)}.")

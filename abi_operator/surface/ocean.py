@@ -15,8 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._numerics import safe_sqrt
-from .azimuth import azimuth_mode, glint_azimuths
+from .azimuth import azimuth_mode, glint_azimuths, sine_of
 
 # Refractive index n - ik of pure water at the centroids of GOES-16. [-] (D. J. Segelstein, "The
 # complex refractive index of water", M.S. thesis, University of Missouri-Kansas City, 1981; n
@@ -248,12 +247,8 @@ def glint(
 
 def _horizontal(mu_out: Array, mu_in: Array, relative_azimuth: Array) -> Array:
     """Square of the horizontal part of the sum of both directions."""
-    out, into = _sine(mu_out), _sine(mu_in)
+    out, into = sine_of(mu_out), sine_of(mu_in)
     return (out - into) ** 2 + 4 * out * into * jnp.cos(relative_azimuth / 2) ** 2
-
-
-def _sine(mu: Array) -> Array:
-    return safe_sqrt((1 - mu) * (1 + mu))
 
 
 def _shadowing(mu: Array, variance: Array) -> Array:
@@ -261,7 +256,7 @@ def _shadowing(mu: Array, variance: Array) -> Array:
 
     t is sigma tan(theta). Below 0.04 it is 0 to 1e-270, and its formula 0 times infinity.
     """
-    slope = jnp.sqrt(variance) * _sine(mu) / mu
+    slope = jnp.sqrt(variance) * sine_of(mu) / mu
     flat = slope < 0.04
     t = jnp.where(flat, 1, slope)
     value = 0.5 * (t / float(np.sqrt(np.pi)) * jnp.exp(-1 / t**2) - jax.scipy.special.erfc(1 / t))
@@ -309,5 +304,5 @@ def glint_width(
     As a function of azimuth the slopes' density is :math:`\exp(-\kappa\cos\Delta\phi)`, with
     :math:`\kappa = 2\sin\theta_i\sin\theta_v / (\sigma(\mu_i + \mu_v))^2`.
     """
-    sharpness = 2 * _sine(mu_out) * _sine(mu_in) / (variance * (mu_out + mu_in) ** 2)
+    sharpness = 2 * sine_of(mu_out) * sine_of(mu_in) / (variance * (mu_out + mu_in) ** 2)
     return 1 / jnp.sqrt(1 + SPREAD * sharpness)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._numerics import safe_sqrt
-from .azimuth import azimuth_mode, gauss_azimuths
+from .azimuth import azimuth_mode, gauss_azimuths, sine_of
 
 # Weights of f_iso, f_vol and f_geo in white-sky albedo. [-] (Schaaf et al. 2002)
 WHITE_SKY = (1.0, 0.189184, -1.377622)
@@ -161,7 +161,7 @@ def kernels(
        doi:10.1029/95JD02371
     """
     out, into = bent(mu_out), bent(mu_in)
-    sines = _sine(out) * _sine(into)
+    sines = sine_of(out) * sine_of(into)
     backward = jnp.cos(relative_azimuth)
     cos_angle = out * into + sines * backward
     volume = _ross_function(cos_angle) / (out + into) - np.pi / 4
@@ -169,7 +169,7 @@ def kernels(
     secants = 1 / (out * into)
     tangents = sines * secants
     # tan^2 + tan^2 - 2 tan tan cos phi, without its cancellation near the hot spot.
-    apart = (_sine(out) / out - _sine(into) / into) ** 2
+    apart = (sine_of(out) / out - sine_of(into) / into) ** 2
     distance = apart + 4 * tangents * jnp.sin(relative_azimuth / 2) ** 2
     distance = distance + (tangents * jnp.sin(relative_azimuth)) ** 2
     mean_secant = 0.5 * (out + into) * secants
@@ -178,14 +178,10 @@ def kernels(
     return volume, geometric
 
 
-def _sine(mu: Array) -> Array:
-    return safe_sqrt((1 - mu) * (1 + mu))
-
-
 @jax.custom_jvp
 def _ross_function(c: Array) -> Array:
     """(pi/2 - xi) cos xi + sin xi at c = cos xi: smooth at xi = 0 although arccos is not."""
-    return c * _arcsine(c) + _sine(c)
+    return c * _arcsine(c) + sine_of(c)
 
 
 @_ross_function.defjvp
@@ -196,31 +192,31 @@ def _ross_function_jvp(primals, tangents):
 
 def _arcsine(c: Array) -> Array:
     """Arc sine, with rounding above 1 or below -1 allowed; its derivative there is 0."""
-    return jnp.arctan2(c, _sine(c))
+    return jnp.arctan2(c, sine_of(c))
 
 
 @jax.custom_jvp
 def _overlap_function(x: Array) -> Array:
     """T - sin t cos t at x = cos t >= 0; 0 from 1 on, which it meets with slope 0."""
-    return jnp.where(x < 1, jnp.arctan2(_sine(x), x) - x * _sine(x), 0)
+    return jnp.where(x < 1, jnp.arctan2(sine_of(x), x) - x * sine_of(x), 0)
 
 
 @_overlap_function.defjvp
 def _overlap_function_jvp(primals, tangents):
     (x,), (tangent,) = primals, tangents
-    return _overlap_function(x), -2 * _sine(x) * tangent
+    return _overlap_function(x), -2 * sine_of(x) * tangent
 
 
 @jax.custom_jvp
 def _zenith_squared(mu: Array) -> Array:
     """Square of the zenith angle, whose derivative in the cosine is -2 at the zenith. [rad2]"""
-    return jnp.arctan2(_sine(mu), mu) ** 2
+    return jnp.arctan2(sine_of(mu), mu) ** 2
 
 
 @_zenith_squared.defjvp
 def _zenith_squared_jvp(primals, tangents):
     (mu,), (tangent,) = primals, tangents
-    sine = _sine(mu)
+    sine = sine_of(mu)
     upright = sine == 0
     ratio = jnp.where(upright, 1, jnp.arctan2(sine, mu) / jnp.where(upright, 1, sine))
     return _zenith_squared(mu), -2 * ratio * tangent

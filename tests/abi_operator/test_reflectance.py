@@ -9,7 +9,7 @@ from cdisort import cdisort_brf
 from states import column
 
 import abi_operator
-from abi_operator import BANDS, GRASSO2013, brf, reflectance, reflectance_factor
+from abi_operator import BANDS, GRASSO2013, band_columns, brf, reflectance_factor
 from abi_operator.optical_properties import OpticalProperties
 
 # Rayleigh depth at 1013.25 hPa and beta2 (Bodhaine et al. 1999); smoke relative to 555 nm, its
@@ -78,17 +78,17 @@ def test_batches_equal_single_columns():
 
 def test_exponential_terms_are_weighted_runs(monkeypatch):
     """A band of two gas terms is the weighted sum of two grey bands."""
-    plain = reflectance.column_optics
+    plain = band_columns.column_optics
 
     def absorbing(depths, weights):
-        def optics(atmosphere, band):
+        def optics(atmosphere, band, gases):
             gas = jnp.asarray(depths)[:, None] * jnp.ones(atmosphere.height.shape[0] - 1)
-            return plain(atmosphere, band) + OpticalProperties(gas, jnp.asarray(weights), ())
+            return plain(atmosphere, band, gases) + OpticalProperties(gas, jnp.asarray(weights), ())
 
         return optics
 
     def run(depths, weights, name):
-        monkeypatch.setattr(reflectance, "column_optics", absorbing(depths, weights))
+        monkeypatch.setattr(band_columns, "column_optics", absorbing(depths, weights))
         jax.clear_caches()
         return brf(column(), (name,), num_doublings=5)
 

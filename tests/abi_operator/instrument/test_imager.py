@@ -187,7 +187,7 @@ def test_derivative_with_respect_to_settings():
         return observe(cells, WEIGHTS, "C07", imager).radiance
 
     width, temperature = jnp.asarray(0.1), jnp.asarray(400.0)
-    gradient = jax.grad(function, (0, 1))(width, temperature)
+    gradient = jax.jit(jax.grad(function, (0, 1)))(width, temperature)
     for i, step in enumerate((1e-5, 1e-3)):
         ends = [
             function(width + sign * step * (i == 0), temperature + sign * step * (i == 1))

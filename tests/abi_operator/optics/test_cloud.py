@@ -47,14 +47,15 @@ def test_clear_layers_are_empty(make_atmosphere):
 
 
 def test_mass_without_number_is_empty(make_atmosphere):
-    atmosphere = with_cloud(make_atmosphere(4), [0.1] * 4, [0.0, -0.0, -1.0, -1e9])
+    number = np.resize([0.0, -0.0, -1.0, -1e9], 10)
+    atmosphere = with_cloud(make_atmosphere(), np.full(10, 0.1), number)
     np.testing.assert_array_equal(liquid_cloud(atmosphere, BANDS["C01"]).tau, 0)
 
 
 def test_depth_is_linear_in_traces_of_mass(make_atmosphere):
-    mass, number = 1e-12 * np.arange(1, 5), np.full(4, 1e10)
-    tau = liquid_cloud(with_cloud(make_atmosphere(4), mass, number), BANDS["C01"]).tau[0]
-    np.testing.assert_allclose(tau, float(tau[0]) * np.arange(1, 5), rtol=1e-14)
+    mass, number = 1e-12 * np.arange(1, 11), np.full(10, 1e10)
+    tau = liquid_cloud(with_cloud(make_atmosphere(), mass, number), BANDS["C01"]).tau[0]
+    np.testing.assert_allclose(tau, float(tau[0]) * np.arange(1, 11), rtol=1e-14)
 
 
 @pytest.mark.float32

@@ -21,7 +21,7 @@ PHASES = [
 
 @pytest.mark.parametrize("phase", PHASES)
 def test_moments_are_integrals_of_the_phase_function(phase):
-    value = np.stack([phase(jnp.asarray(node)) for node in NODES])
+    value = jax.jit(jax.vmap(phase))(jnp.asarray(NODES))
     polynomials = np.polynomial.legendre.legvander(NODES, NUM_MOMENTS - 1)
     integrals = np.einsum("n,nk,nl->kl", WEIGHTS / 2, value, polynomials)
     np.testing.assert_allclose(phase.moments(NUM_MOMENTS), integrals, rtol=0, atol=QUADRATURE)
@@ -29,7 +29,7 @@ def test_moments_are_integrals_of_the_phase_function(phase):
 
 
 @pytest.mark.parametrize("phase", PHASES)
-@pytest.mark.parametrize("num_moments", [1, 2, 3, 8])
+@pytest.mark.parametrize("num_moments", [1, 2, 8])
 def test_any_number_of_moments(phase, num_moments):
     moments = phase.moments(num_moments)
     np.testing.assert_array_equal(moments, phase.moments(NUM_MOMENTS)[:, :num_moments])
@@ -45,7 +45,7 @@ def test_henyey_greenstein_is_isotropic_at_zero_and_forward_at_positive_asymmetr
 
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 def test_derivative_of_moments_is_exact_at_zero_asymmetry(mode):
-    derivative = mode(lambda g: HenyeyGreenstein(g).moments(5)[0])(jnp.asarray(0.0))
+    derivative = jax.jit(mode(lambda g: HenyeyGreenstein(g).moments(5)[0]))(jnp.asarray(0.0))
     np.testing.assert_array_equal(derivative, [0, 1, 0, 0, 0])
 
 

@@ -21,6 +21,7 @@ def directions(count, lowest, seed=0):
     return mu0, mu, rng.uniform(-np.pi, np.pi, count)
 
 
+@pytest.mark.slow
 def test_response_is_the_solvers():
     mu0, mu, azimuth = directions(32, 0.4)
     tau = np.geomspace(2e-4, 0.2, 32)

@@ -34,7 +34,7 @@ def test_report_by_column():
     np.testing.assert_array_equal(high.lowest_brdf[2], 1.1)
 
 
-@pytest.mark.parametrize("kind", ["lambertian", "ross_li", "ocean"])
+@pytest.mark.parametrize("kind", ["lambertian", "ross_li"])
 def test_fields_and_suns_broadcast(make_ground, kind):
     ground = make_ground(kind, (3,))
     mu0 = jnp.asarray([0.3, 0.6, 0.9])

@@ -8,7 +8,9 @@ import pytest
 KINDS = ("lambertian", "ross_li", "ocean")
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", ["lambertian", "ross_li", pytest.param("ocean", marks=pytest.mark.slow)]
+)
 def test_trailing_batch_vmap_and_columns_agree(make_ground, kind):
     ground = make_ground(kind, (4,))
     ground = jax.tree.map(lambda x: jnp.broadcast_to(x, (4,)), ground)

@@ -3,7 +3,6 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-import pytest
 
 from abi_operator.surface import RossLi, directional_albedo
 from abi_operator.surface.ross_li import BLACK_SKY_GEOMETRIC, BLACK_SKY_VOLUME, bent, kernels
@@ -114,7 +113,7 @@ def test_black_sky_has_a_slope_at_the_zenith():
 def test_the_limit_is_smooth():
     mu = jnp.asarray([0.0, 0.5 * CUT, CUT, 0.5, 1.0])
     np.testing.assert_allclose(bent(mu), [CUT / 2, 0.625 * CUT, CUT, 0.5, 1], rtol=1e-15)
-    slope = jax.vmap(jax.grad(bent))
+    slope = jax.jit(jax.vmap(jax.grad(bent)))
     sides = slope(jnp.asarray([CUT * (1 - 1e-9), CUT * (1 + 1e-9)]))
     np.testing.assert_allclose(sides, 1, rtol=1e-8)
     np.testing.assert_array_equal(slope(jnp.asarray([0.0])), 0)
@@ -179,9 +178,9 @@ def test_derivatives_in_angles_against_differences():
             np.testing.assert_allclose(slope, difference, rtol=1e-4, atol=1e-6)
 
 
-@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
-def test_derivatives_are_finite_in_the_corners(corners, dtype):
-    inputs = tuple(jnp.asarray(x, dtype) for x in corners)
+def test_derivatives_are_finite_in_the_corners(corners):
+    # Single precision, which leaves its range first.
+    inputs = tuple(jnp.asarray(x, jnp.float32) for x in corners)
 
     def totals(*inputs):
         return jnp.stack([jnp.sum(kernel) for kernel in kernels(*inputs)])

@@ -64,7 +64,7 @@ def published_depth(band, gas, air_mass, atmosphere):
 
 
 @pytest.mark.parametrize("band", SUM_ERROR)
-@pytest.mark.parametrize("name", PROFILES)
+@pytest.mark.parametrize("name", ["tropical", "midlatitude_winter"])  # most vapour, and least
 def test_sums_have_the_published_transmittance(band, name):
     """Each gas alone and all together, from the ground and from 2 km, one and two ways."""
     for ground, mixing in ((0.0, 1.1), (2000.0, 0.9)):
@@ -192,14 +192,16 @@ def test_layers_add(band):
     np.testing.assert_allclose(coarse, fine, atol=THICK_LAYERS.get(band, 1e-12), rtol=0)
 
 
-@pytest.mark.parametrize("band", DISTINCT)
+@pytest.mark.parametrize("band", ["C04", "C06"])  # nearly every kind of amount
 def test_derivatives(band):
     """Forward against differences and backward against forward; finite where a gas is absent."""
 
-    @jax.jit
-    def depth(atmosphere):
+    def log_transmittance(atmosphere):
         optics = gas_absorption(atmosphere, BANDS[band])
         return jnp.log(transmittance(optics, jnp.asarray(2.5)))
+
+    forward_of = jax.jit(lambda a, tangent: jax.jvp(log_transmittance, (a,), (tangent,)))
+    backward_of = jax.jit(jax.grad(log_transmittance))
 
     height = np.linspace(60e3, 0, 9)
     atmosphere = standard_atmosphere("midlatitude_summer", height)
@@ -210,9 +212,10 @@ def test_derivatives(band):
     up, down = (
         jax.tree.map(lambda x, d, s=s: x + s * d, atmosphere, direction) for s in (step, -step)
     )
-    forward = jax.jvp(depth, (atmosphere,), (direction,))[1]
-    np.testing.assert_allclose(forward, (depth(up) - depth(down)) / (2 * step), rtol=1e-7)
-    backward = jax.grad(depth)(atmosphere)
+    forward = forward_of(atmosphere, direction)[1]
+    ahead, behind = (forward_of(a, direction)[0] for a in (up, down))
+    np.testing.assert_allclose(forward, (ahead - behind) / (2 * step), rtol=1e-7)
+    backward = backward_of(atmosphere)
     along = sum(
         jnp.vdot(g, d)
         for g, d in zip(jax.tree.leaves(backward), jax.tree.leaves(direction), strict=True)
@@ -221,16 +224,16 @@ def test_derivatives(band):
     none = eqx.tree_at(
         lambda a: a.gases, atmosphere, jax.tree.map(jnp.zeros_like, atmosphere.gases)
     )
-    for leaf in jax.tree.leaves(jax.grad(depth)(none)):
+    for leaf in jax.tree.leaves(backward_of(none)):
         assert np.all(np.isfinite(leaf))
 
 
-@pytest.mark.parametrize("band", ["C04", "C06"])
+@pytest.mark.parametrize("band", ["C06"])
 def test_batch_is_a_loop(band):
     height = np.linspace(40e3, 0, 41)
     columns = [standard_atmosphere(name, height) for name in PROFILES]
     batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *columns)
-    together = jax.vmap(lambda a: gas_absorption(a, BANDS[band]).extinction)(batch)
+    together = jax.jit(jax.vmap(lambda a: gas_absorption(a, BANDS[band]).extinction))(batch)
     for column, extinction in zip(columns, together, strict=True):
         one = gas_absorption(column, BANDS[band]).extinction
         np.testing.assert_allclose(one, extinction, rtol=1e-13)

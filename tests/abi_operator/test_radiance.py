@@ -1,0 +1,152 @@
+"""Radiances of sun, ground and fires against Planck, Beer and the reflectances."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator import (
+    Fire,
+    Geometry,
+    State,
+    brf,
+    radiance,
+    reflectance_factor,
+    standard_atmosphere,
+)
+from abi_operator.bands import BANDS
+from abi_operator.instrument import range_ceiling
+from abi_operator.optics import gas_absorption, rayleigh, transmittance
+from abi_operator.planck import brightness_temperature, in_band_radiance
+from abi_operator.satellites import solar_irradiance
+
+LEVELS = np.linspace(30e3, 0.0, 9)
+OPTIONS = {"num_streams": 2, "num_doublings": 2}
+NIGHT = Geometry(jnp.asarray(2.0), jnp.asarray(0.5), jnp.asarray(1.0))
+SEEN = ("C02", "C06", "C07")
+DAY = Geometry(jnp.asarray(0.6), jnp.asarray(0.5), jnp.asarray(1.0))
+
+
+def make_state(geometry=DAY, albedo=0.2, **changes):
+    air = standard_atmosphere("us_standard", LEVELS)
+    albedos = {band: jnp.asarray(albedo) for band in BANDS}
+    state = State(air, albedos, geometry, surface_temperature=jnp.asarray(300.0))
+    return dataclasses.replace(state, **changes)
+
+
+def without_gases(state):
+    """With none of those that it could lack; it keeps its oxygen and nitrogen."""
+    nothing = jax.tree.map(jnp.zeros_like, state.atmosphere.gases)
+    return dataclasses.replace(
+        state, atmosphere=dataclasses.replace(state.atmosphere, gases=nothing)
+    )
+
+
+def seen(state):
+    """Radiances by band; every test asks for the same, so that all share a program."""
+    return dict(zip(SEEN, np.asarray(radiance(state, SEEN, **OPTIONS)), strict=True))
+
+
+def test_without_emission_it_is_the_reflectance():
+    state, bands = make_state(), ("C02", "C06")
+    factors = reflectance_factor(state, bands, **OPTIONS)
+    for band, factor in zip(bands, factors, strict=True):
+        expected = factor * solar_irradiance(band, "GOES-16") / np.pi
+        np.testing.assert_allclose(seen(state)[band], expected, rtol=1e-13)
+
+
+def test_isothermal_air_over_a_black_ground_is_a_black_body():
+    state = make_state(NIGHT, albedo=0.0)
+    warm = jnp.full(len(LEVELS), 300.0)
+    state = dataclasses.replace(
+        state, atmosphere=dataclasses.replace(state.atmosphere, temperature=warm)
+    )
+    temperature = brightness_temperature(jnp.asarray(seen(state)["C07"]), "C07")
+    # Nothing shines on its top, so it lacks what scattering sends back of that: 1e-5 of it.
+    np.testing.assert_allclose(temperature, 300.0, atol=1e-3)
+
+
+def test_a_ground_shines_through_thin_air():
+    clear = without_gases(make_state(NIGHT))
+    clear = dataclasses.replace(
+        clear, atmosphere=dataclasses.replace(clear.atmosphere, pressure=1e-3 * LEVELS[::-1])
+    )
+    expected = 0.8 * in_band_radiance(jnp.asarray(300.0), "C07")
+    np.testing.assert_allclose(seen(clear)["C07"], expected, rtol=1e-5)
+
+
+def test_gases_dim_a_fire_by_their_transmittance():
+    hot = make_state(NIGHT, albedo=0.0, fire=Fire(jnp.asarray(0.04), jnp.asarray(900.0)))
+    cold = dataclasses.replace(hot, fire=Fire(jnp.asarray(0.0), jnp.asarray(900.0)))
+    with_fire, without = seen(hot), seen(cold)
+    assert with_fire["C02"] == without["C02"] == 0
+    for name in ("C06", "C07"):
+        absorbed = gas_absorption(hot.atmosphere, BANDS[name]) + rayleigh(
+            hot.atmosphere, BANDS[name]
+        )
+        flames, ground = (in_band_radiance(jnp.asarray(t), name) for t in (900.0, 300.0))
+        clear = transmittance(absorbed, 1 / hot.geometry.mu)
+        more = with_fire[name] - without[name]
+        # What air scatters, 3e-4 of it at most, is not in the transmittance.
+        np.testing.assert_allclose(more, clear * 0.04 * (flames - ground), rtol=1e-3)
+
+
+def test_a_small_fire_saturates_c07_and_not_c06():
+    fire = Fire(jnp.asarray(0.04), jnp.asarray(750.0))
+    found = seen(make_state(albedo=0.1, fire=fire))
+    assert found["C07"] > range_ceiling("C07", "GOES-16")
+    assert found["C06"] < range_ceiling("C06", "GOES-16")
+
+
+def test_batches_are_columns_and_night_is_dark():
+    states = [make_state(DAY), make_state(NIGHT)]
+    batch = jax.tree.map(lambda *x: jnp.stack(x), *states)
+    found = radiance(batch, SEEN, **OPTIONS)
+    for k, state in enumerate(states):
+        np.testing.assert_allclose(found[k], list(seen(state).values()), rtol=1e-12, atol=1e-15)
+    assert found[1, 0] == found[1, 1] == 0
+    assert found[1, 2] > 0
+
+
+def test_derivatives_in_temperatures_and_fire():
+    state = make_state(fire=Fire(jnp.asarray(0.01), jnp.asarray(800.0)))
+
+    @jax.jit
+    def total(state):
+        return jnp.sum(radiance(state, ("C06", "C07"), **OPTIONS))
+
+    slopes = jax.jit(jax.grad(total))(state)
+    assert all(jnp.all(jnp.isfinite(x)) for x in jax.tree.leaves(slopes))
+    for read, step in (
+        (lambda s: s.fire.temperature, 1e-2),
+        (lambda s: s.fire.fraction, 1e-5),
+        (lambda s: s.surface_temperature, 1e-2),
+        (lambda s: s.albedo["C07"], 1e-4),
+    ):
+        ends = []
+        for sign in (1, -1):
+            leaves, tree = jax.tree.flatten(state)
+            moved = [x + sign * step if x is read(state) else x for x in leaves]
+            ends.append(total(jax.tree.unflatten(tree, moved)))
+        difference = (ends[0] - ends[1]) / (2 * step)
+        np.testing.assert_allclose(read(slopes), difference, rtol=1e-5)
+
+
+def test_refused():
+    cold = make_state(surface_temperature=None)
+    with pytest.raises(ValueError, match="C07.* needs surface_temperature"):
+        radiance(cold, ("C07",))
+    with pytest.raises(ValueError, match="gas absorption of C04 is not that of GOES-19"):
+        radiance(make_state(), ("C04",), satellite="GOES-19")
+    with pytest.raises(ValueError, match="GOES-20"):
+        radiance(make_state(), ("C01",), satellite="GOES-20")
+
+
+def test_eight_bands_and_their_gases():
+    state, every = make_state(), tuple(BANDS)
+    clear = dict(zip(every, brf(without_gases(state), every, **OPTIONS), strict=True))
+    dimmed = dict(zip(every, brf(state, every, **OPTIONS), strict=True))
+    assert all(dimmed[band] < clear[band] for band in BANDS)
+    assert dimmed["C04"] < 0.01 < clear["C04"]  # vapour hides the ground
