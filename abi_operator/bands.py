@@ -5,7 +5,7 @@ A band is named by the string that ABI files use, ``"C01"``. Inputs that differ 
 that a state holds just the bands it was specified for and a Jacobian says by name which is which.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 
@@ -43,11 +43,11 @@ GRASSO2013 = ("C01", "C02", "C03", "C06")
 """The reflective bands of Grasso et al. (2013): those simulated where nothing else is asked for."""
 
 
-def check_bands(bands: Sequence[str]) -> tuple[str, ...]:
-    """Return `bands` as a tuple, or raise `ValueError` naming the ones that are not simulated."""
-    unknown = [name for name in bands if name not in BANDS]
+def check_bands(bands: Sequence[str], known: Collection[str] = BANDS) -> tuple[str, ...]:
+    """Return `bands` as a tuple, or raise `ValueError` naming the ones that are not `known`."""
+    unknown = [name for name in bands if name not in known]
     if unknown or not bands:
-        raise ValueError(f"bands {unknown or '()'} are not simulated; choose from {list(BANDS)}.")
+        raise ValueError(f"bands {unknown or '()'} are not simulated; choose from {list(known)}.")
     if len(set(bands)) != len(bands):
         raise ValueError(f"each band can be asked for once; got {tuple(bands)}.")
     return tuple(bands)

@@ -78,7 +78,7 @@ def simulate(
     if num_streams % 2:
         raise typer.BadParameter(f"the number of streams is even; got {num_streams}.")
     try:
-        names = check_bands([name.strip() for name in bands.split(",")])
+        names = check_bands([name.strip() for name in bands.split(",")], GRASSO2013)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     request = Request(

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 import xarray as xr
 
-from abi_operator.bands import check_bands
+from abi_operator.bands import GRASSO2013, check_bands
 from abi_operator.commands import one_sentence
 from abi_operator.files import InputError, output_folder, read_result
 
@@ -29,7 +29,7 @@ def retrieve(
 ) -> None:
     """Retrieve the optical depth of smoke from a simulated result."""
     try:
-        names = check_bands([name.strip() for name in bands.split(",")])
+        names = check_bands([name.strip() for name in bands.split(",")], GRASSO2013)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     with one_sentence(), read_result(result) as dataset:

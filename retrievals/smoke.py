@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from abi_operator import State
-from abi_operator.bands import check_bands
+from abi_operator.bands import GRASSO2013, check_bands
 from abi_operator.files import InputError
 from abi_operator.nomenclature import PLUME, SCENARIO
 from abi_operator.scene import column_states
@@ -82,7 +82,7 @@ def retrieve_smoke(
     InputError
         Where the Dataset lacks a variable or a band.
     """
-    bands = check_bands(bands)
+    bands = check_bands(bands, GRASSO2013)
     vector = StateVector(retrieve_ssa, aod_limit)
     _check(dataset, bands, vector)
     if num_streams is None:

@@ -98,7 +98,7 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
         mandatory quality among the MODIS bands used; 0 full inversion, 1 magnitude inversion, 255
         none. The order of ``lat`` is the file's.
     """
-    bands = check_bands(bands)
+    bands = check_bands(bands, MODIS_TO_ABI)
     with open_netcdf(path) as file:
         regressions = _choose_regressions(file, bands, broadband, path)
         used = tuple(dict.fromkeys(name for r in regressions for name in r.weights))

@@ -30,7 +30,7 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
         NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
         faster.
     """
-    bands = check_bands(bands)
+    bands = check_bands(bands, GRASSO2013)
     reader = _Reader(scenario)
     surface_albedo = reader.by_band("surface_albedo", bands)
     angles = {

@@ -72,7 +72,7 @@ def scenario(
     InputError
         Where the albedo is missing or does not cover the scene, or a value is out of its range.
     """
-    bands = check_bands(bands)
+    bands = check_bands(bands, GRASSO2013)
     droplet_number = droplet_number or DropletNumber()
     if added_heights is None:
         added_heights = completion_heights(highest_top(model))

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..atmosphere import Atmosphere, State
-from ..bands import BANDS, check_bands
+from ..bands import BANDS, GRASSO2013, check_bands
 from ..files.netcdf import cf_attributes
 from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import aerosol, liquid_cloud, rayleigh
@@ -50,7 +50,7 @@ def simulate(
     """
     if bands is None:
         bands = tuple(str(band) for band in scenario["band"].values)
-    bands = check_bands(bands)
+    bands = check_bands(bands, GRASSO2013)
     states = column_states(scenario, bands)
     num_columns = len(states.geometry.solar_zenith)
     fields = map_chunks(
