@@ -17,7 +17,8 @@ from jax.experimental.xla_metadata import set_xla_metadata
 from jax.extend.core import ClosedJaxpr, Primitive, jaxpr_as_fun
 from jax.interpreters import ad, batching, mlir
 
-_LARGEST = 8
+# Rows of matrices up to which a layer is one kernel: see `one_kernel`.
+_LARGEST, _LARGEST_OF_FLOAT32 = 8, 2
 
 _one_kernel = Primitive("one_kernel")
 _one_kernel.multiple_results = True
@@ -26,10 +27,11 @@ _one_kernel.multiple_results = True
 def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., Any]:
     """`function`, of matrices with `num_nodes` rows and a tile of columns, as one kernel.
 
-    XLA has neither code in it for a ``dot`` nor for an operation that it would share among threads:
-    one on half a megabyte, or of more arithmetic than bytes on 20 kilobytes. Up to 8 rows and the
-    tiles of `_batching` nothing comes near; with more, `function` is left as it is. So are its
-    derivatives, and what `jax.vmap` makes of it, in which nobody has counted.
+    XLA has neither code in it for a ``dot`` nor for an operation that it would share among threads,
+    and does not compile a program with one: an operation on half a megabyte, or of more arithmetic
+    than bytes on 20 kilobytes. With the tiles of `_batching` there is none up to 8 rows in float64,
+    nor up to 2 in float32, whose bytes are half as many; larger ones are left as they are. So are
+    derivatives of `function` and what `jax.vmap` makes of it, in which nobody has counted.
 
     Parameters
     ----------
@@ -38,11 +40,12 @@ def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., An
     num_nodes
         Rows of the matrices.
     """
-    if num_nodes > _LARGEST:
-        return function
 
     def call(*args: Any) -> Any:
         leaves, structure = jax.tree.flatten(args)
+        double = jnp.result_type(*leaves) == jnp.float64
+        if num_nodes > (_LARGEST if double else _LARGEST_OF_FLOAT32):
+            return function(*args)
 
         def flat(*leaves: Any) -> Any:
             return function(*jax.tree.unflatten(structure, leaves))
