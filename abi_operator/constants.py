@@ -9,6 +9,8 @@ VAPOUR_GAS_CONSTANT = 461.6
 KAPPA = 2.0 / 7.0
 # WRF's acceleration of gravity, by which geopotential becomes height. [m s-2]
 GRAVITY = 9.81
+# Melting point of ice. [K]
+FREEZING = 273.15
 # Density of liquid water. [kg m-3]
 WATER_DENSITY = 1000.0
 # Distance of a geostationary satellite above the equator. [m] (GOES-R PUG, vol. 3)

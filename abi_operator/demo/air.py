@@ -4,7 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..constants import DRY_AIR_GAS_CONSTANT, GRAVITY, STANDARD_PRESSURE, VAPOUR_GAS_CONSTANT
+from ..constants import (
+    DRY_AIR_GAS_CONSTANT,
+    FREEZING,
+    GRAVITY,
+    STANDARD_PRESSURE,
+    VAPOUR_GAS_CONSTANT,
+)
 
 TOP_PRESSURE = 5000.0
 """Pressure at the top of the model. [Pa]"""
@@ -98,7 +104,7 @@ def make_air(terrain: np.ndarray, marine: np.ndarray) -> Air:
 
 def saturation_mixing_ratio(pressure: np.ndarray, temperature: np.ndarray) -> np.ndarray:
     """Water vapour that saturates air, over water (Bolton 1980). [Pa], [K] -> [kg kg-1]"""
-    celsius = temperature - 273.15
+    celsius = temperature - FREEZING
     saturation = 611.2 * np.exp(17.67 * celsius / (celsius + 243.5))
     return _VAPOUR_RATIO * saturation / (pressure - saturation)
 

@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 
 from ..bands import check_bands
+from ..surface.modis_to_abi import MODIS_TO_ABI, BandRegression
 from .errors import InputError
-from .modis_bands import BROADBAND_STAND_IN, MODIS_TO_ABI, WHITE_SKY, AlbedoRegression
+from .modis_bands import BROADBAND_STAND_IN, WHITE_SKY
 from .netcdf import FilePath, cf_attributes, load, open_netcdf, require_dims, require_variables
 
 VARIABLE_MAP = {
@@ -76,7 +77,7 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
     """Read white-sky albedo in bands of ABI from an AppEEARS file of MCD43A1.
 
     White-sky albedo of a MODIS band is f_iso + 0.189184 f_vol - 1.377622 f_geo; that of an ABI
-    band is a regression on one or two of them, `modis_bands.MODIS_TO_ABI`.
+    band is a regression on one or two of them, `surface.MODIS_TO_ABI`.
 
     Parameters
     ----------
@@ -152,7 +153,7 @@ def _read(
 
 def _choose_regressions(
     file: xr.Dataset, bands: tuple[str, ...], broadband: bool, path: FilePath
-) -> list[AlbedoRegression]:
+) -> list[BandRegression]:
     """For each ABI band its regression on MODIS bands, or a broadband in their stead."""
     chosen, lacking, remedy = [], [], ""
     for band in bands:
@@ -166,7 +167,7 @@ def _choose_regressions(
                 UserWarning,
                 stacklevel=3,
             )
-            regression = AlbedoRegression({stand_in: 1.0}, 0.0)
+            regression = BandRegression({stand_in: 1.0}, 0.0)
         else:
             lacking += missing
             if missing and stand_in is not None and not broadband:

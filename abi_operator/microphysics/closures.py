@@ -17,9 +17,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..constants import FREEZING
 from .gamma import MassLaw, log_gamma, log_moment
-
-FREEZING = 273.15  # melting point of ice. [K]
 
 
 def soft_limits(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from ..constants import FREEZING
 from .column_air import dry_air_path
 
 NOT_SIMULATED = {
@@ -19,7 +20,6 @@ NOT_SIMULATED = {
 # WRF's number of WSM3, in which cloud water below 0 C is ice. (WRF Registry; Hong et al. 2004,
 # doi:10.1175/1520-0493(2004)132<0103:ARATIM>2.0.CO;2)
 _WSM3 = 3
-_FREEZING = 273.15  # [K]
 
 
 class DropletNumber(NamedTuple):
@@ -121,7 +121,7 @@ def condensate(model: xr.Dataset) -> Condensate:
         if name in model
     }
     left_out = {kind: mass for kind, mass in left_out.items() if mass > 0}
-    frozen = model["temperature"].values < _FREEZING
+    frozen = model["temperature"].values < FREEZING
     wsm3 = model.attrs.get("microphysics_scheme") == _WSM3
     return Condensate(
         total=float(liquid.sum()) + sum(left_out.values()),

@@ -31,7 +31,7 @@ MODIS_TO_ABI: dict[str, BandRegression] = {
     "C03": BandRegression({"Band2": 1.003}, 0.0009),
     "C04": BandRegression({"Band5": 1 - _SHARE6, "Band6": _SHARE6}),
     "C05": BandRegression({"Band5": -0.045, "Band6": 1.043}, -0.0021),
-    "C06": BandRegression({"Band6": 0.0745, "Band7": 0.897}, 0.0033),
+    "C06": BandRegression({"Band7": 0.897, "Band6": 0.0745}, 0.0033),
 }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abi_operator.files import InputError, read_mcd43a1, read_white_sky
-from abi_operator.files.modis_bands import MODIS_TO_ABI
+from abi_operator.surface import MODIS_TO_ABI
 
 FILL = 32767
 # Rounding of sums of a few float64 numbers of order 1.
