@@ -9,10 +9,15 @@ other, however a program is written. It does run several CPU devices at a time, 
 more than one (``JAX_NUM_CPU_DEVICES=4``, before JAX is first used) every device takes its share of
 the tiles, under any transformation. What comes back then lies on all of them. Not so where the
 caller settles what runs where: by `jax.default_device`, a mesh, or several processes.
+
+Where a batch divides evenly, it is divided as it comes, before anything is done to it
+(`on_every_device`): each device then copies and transposes its own columns and nothing is
+exchanged. Left to XLA, to pad, transpose and cut an array of which each device holds a part takes a
+few dozen exchanges, 4 ms a call, as long as 500 columns of 4 streams.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
@@ -49,9 +54,7 @@ def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
         Columns a tile, at most.
     """
     size = jax.tree.leaves(columns)[0].shape[-1]
-    devices = _devices()
-    if size < _FEWEST_A_DEVICE * len(devices):
-        devices = devices[:1]
+    devices = _devices(size)
     count, width = _equal_tiles(size, tile, len(devices))
     if count == 1:
         return function(columns)
@@ -70,22 +73,52 @@ def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
         return jax.lax.map(jax.checkpoint(function), tiles)
 
     if len(devices) > 1:
-        share = PartitionSpec("device")
-        mesh = Mesh(np.asarray(devices), ("device",))
-        # Nothing is exchanged between the devices, so there is nothing to check.
-        mapped = jax.shard_map(mapped, mesh=mesh, in_specs=share, out_specs=share, check_vma=False)
+        mapped = _divided(mapped, devices, _SHARE)
     return jax.tree.map(joined, mapped(jax.tree.map(tiled, columns)))
 
 
-def _devices() -> list[Any]:
-    """CPU devices that are this program's to use; one of them stands for wherever JAX runs it."""
+def on_every_device(function: Callable[[Any], Any], columns: Any, divided: Sequence[bool]) -> Any:
+    """Apply a batch-first `function`, whose columns do not mix, to a share on every CPU device.
+
+    Parameters
+    ----------
+    function
+        Maps a pytree of arrays to another, in all of which the batch's first axis is the first.
+    columns
+        Its argument.
+    divided
+        Whether the first axis of each of its leaves is the batch's first. Others all columns share.
+    """
+    leaves, structure = jax.tree.flatten(columns)
+    sizes = {x.shape[0] for x, own in zip(leaves, divided, strict=True) if own}
+    size = sizes.pop() if len(sizes) == 1 else 0
+    devices = _devices(size)
+    if len(devices) == 1 or size % len(devices):
+        return function(columns)
+    specs = [_SHARE if own else PartitionSpec() for own in divided]
+    return _divided(function, devices, jax.tree.unflatten(structure, specs))(columns)
+
+
+_SHARE = PartitionSpec("device")
+
+
+def _divided(function: Callable[[Any], Any], devices: list[Any], shares: Any) -> Any:
+    """`function` of shares of its argument, each on its device."""
+    mesh = Mesh(np.asarray(devices), ("device",))
+    # Nothing is exchanged between the devices, so there is nothing to check.
+    return jax.shard_map(function, mesh=mesh, in_specs=(shares,), out_specs=_SHARE, check_vma=False)
+
+
+def _devices(size: int) -> list[Any]:
+    """CPU devices that so many columns occupy and this program may use; one stands for any."""
     devices = jax.local_devices()
     settled = (
         jax.config.jax_default_device is not None  # pyright: ignore[reportAttributeAccessIssue]
         or not jax.sharding.get_abstract_mesh().empty
         or jax.process_count() > 1
     )
-    return devices[:1] if settled or devices[0].platform != "cpu" else devices
+    few = size < _FEWEST_A_DEVICE * len(devices)
+    return devices[:1] if settled or few or devices[0].platform != "cpu" else devices
 
 
 def _equal_tiles(size: int, tile: int, num_devices: int) -> tuple[int, int]:

@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._batching import tile_size
-from .column import Column, Options, aligned, promoted
+from .column import Column, Options, promoted, solved
 from .derivative import independent_columns
 from .program import GroundResponse, ground_response, plane_albedo
 from .surface import AnySurface
-from .toa_brf import outward, prepare
+from .toa_brf import prepare
 
 
 def toa_albedo(
@@ -153,19 +153,15 @@ def surface_coupling(
 
 @partial(jax.jit, static_argnums=1)
 def _plane_albedo(column: Column, options: Options) -> Array:
-    columns, batch = aligned(column, True)
     solve = independent_columns(
         lambda tile: plane_albedo(tile, options), tile_size(options.num_streams)
     )
-    return solve(columns).reshape(batch)
+    return solved(column, True, solve)
 
 
 @partial(jax.jit, static_argnums=(1, 2))
 def _ground_response(column: Column, options: Options, multiple_views: bool) -> GroundResponse:
-    columns, batch = aligned(column, multiple_views)
     solve = independent_columns(
         lambda tile: ground_response(tile, options), tile_size(options.num_streams)
     )
-    found = solve(columns)
-    black, coupling = (outward(x, batch, multiple_views) for x in found[:2])
-    return GroundResponse(black, coupling, found.spherical_albedo.reshape(batch))
+    return solved(column, multiple_views, solve)

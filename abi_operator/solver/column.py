@@ -1,6 +1,8 @@
 """A column as the solver takes it: the arguments of its doors, promoted, checked and aligned."""
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -8,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from .._batching import on_every_device
 from .doublings import sufficient_doublings, unknown_doublings
 from .surface import AnySurface, Lambertian
 
@@ -140,6 +143,35 @@ def choose_doublings(column: Column, num_streams: int) -> int:
         return 0
     min_mu = min(float(np.min(x)) for x in beams if x.size)
     return sufficient_doublings(float(np.max(column.tau)), min_mu, num_streams)
+
+
+def solved(column: Column, multiple_views: bool, solve: Callable[[Column], Any]) -> Any:
+    """What `solve` makes of aligned columns, its batch's axes first and in their shape again.
+
+    Parameters
+    ----------
+    column
+        Promoted arguments, whose batches broadcast.
+    multiple_views
+        Whether there is an axis of views, in the arguments and in those results that have one.
+    solve
+        Maps columns with their batch last (`aligned`) to a pytree of ``*view batch``.
+    """
+
+    def share(column: Column) -> Any:
+        columns, batch = aligned(column, multiple_views)
+        return jax.tree.map(partial(_outward, batch, multiple_views), solve(columns))
+
+    shapes = [x.shape[: x.ndim - len(own_axes(k, multiple_views))] for k, x in _leaves(column)]
+    batch = np.broadcast_shapes(*shapes)
+    divided = [len(shape) == len(batch) > 0 and shape[0] == batch[0] for shape in shapes]
+    return on_every_device(share, column, divided)
+
+
+def _outward(batch: tuple[int, ...], multiple_views: bool, x: jax.Array) -> jax.Array:
+    """From ``*view batch`` to the batch's axes, and the views' where there are several."""
+    views = x.shape[:-1] if multiple_views else ()
+    return jnp.moveaxis(x, -1, 0).reshape(*batch, *views)
 
 
 def aligned(column: Column, multiple_views: bool) -> tuple[Column, tuple[int, ...]]:

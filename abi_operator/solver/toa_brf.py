@@ -3,7 +3,6 @@
 from functools import partial
 
 import jax
-import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .._batching import tile_size
@@ -11,11 +10,11 @@ from .checks import check_arguments
 from .column import (
     Column,
     Options,
-    aligned,
     check_options,
     check_shapes,
     choose_doublings,
     promoted,
+    solved,
 )
 from .derivative import independent_columns
 from .program import emerging
@@ -159,14 +158,7 @@ def prepare(
 
 @partial(jax.jit, static_argnums=(1, 2))
 def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
-    columns, batch = aligned(column, multiple_views)
     solve = independent_columns(
         lambda tile: emerging(tile, options).brf, tile_size(options.num_streams)
     )
-    return outward(solve(columns), batch, multiple_views)
-
-
-def outward(x: Array, batch: tuple[int, ...], multiple_views: bool) -> Array:
-    """From ``view batch`` to the batch's axes, and the views' where there are several."""
-    x = jnp.moveaxis(x, -1, 0)
-    return x.reshape(*batch, *x.shape[1:]) if multiple_views else x.reshape(batch)
+    return solved(column, multiple_views, solve)

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._batching import tile_size
-from .column import Column, Options, aligned, promoted
+from .column import Column, Options, promoted, solved
 from .derivative import independent_columns
 from .program import emerging
 from .surface import AnySurface
-from .toa_brf import outward, prepare
+from .toa_brf import prepare
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
 _LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5
@@ -117,8 +117,6 @@ def _with_harmless_sun(column: Column) -> Column:
 
 @partial(jax.jit, static_argnums=(1, 2))
 def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
-    columns, batch = aligned(column, multiple_views)
-
     def radiance(tile: Column) -> Array:
         brf, emitted = emerging(tile, options)
         assert tile.solar_irradiance is not None
@@ -126,4 +124,4 @@ def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
         return reflected if emitted is None else reflected + emitted
 
     solve = independent_columns(radiance, tile_size(options.num_streams))
-    return outward(solve(columns), batch, multiple_views)
+    return solved(column, multiple_views, solve)

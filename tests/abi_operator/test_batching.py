@@ -55,15 +55,35 @@ def in_a_loop(*arguments):
 
     return jax.lax.fori_loop(0, 2, again, arguments[3])
 
-for function in (solve, slopes, in_a_loop):
+def slopes_of_the_sum(*arguments):
+    "The albedo is all columns' and its slope is from both devices."
+    def total(tau, albedo):
+        return solve(tau, *arguments[1:3], albedo, *arguments[4:]).sum()
+
+    return jax.grad(total, argnums=(0, 1))(arguments[0], arguments[3][0])
+
+def changes(*arguments):
+    return jax.jvp(solve, arguments, arguments)
+
+def in_two_axes(*arguments):
+    return solve(*(x.reshape(2, -1, *x.shape[1:]) for x in arguments))
+
+odd = [x[:299] for x in given]
+cases = [(f, given) for f in (solve, slopes, in_a_loop, slopes_of_the_sum, changes, in_two_axes)]
+for function, arguments in [*cases, (solve, odd)]:
     function = jax.jit(function)
-    shared = function(*given)
+    shared = function(*arguments)
     with jax.default_device(first):
-        alone = function(*given)
+        alone = function(*arguments)
     for a, b in zip(jax.tree.leaves(shared), jax.tree.leaves(alone), strict=True):
         assert b.devices() == {first}, b.devices()
         np.testing.assert_allclose(a, b, rtol=1e-11)  # tiles of other widths round differently
 assert solve(*given).devices() == {first, second}
+
+# Each device has its half from the beginning to the end.
+program = jax.jit(solve).lower(*given).compile().as_text()
+for exchange in ("all-gather", "all-to-all", "collective-permute", "all-reduce"):
+    assert exchange not in program, exchange
 assert len(solve(*(x[:40] for x in given)).devices()) == 1
 
 # An axis that the caller maps over devices is the caller's.
