@@ -24,8 +24,12 @@ from .geometry import Geometry as Geometry
 from .optics import ash as ash
 from .optics import mie_plume as mie_plume
 from .optics import smoke as smoke
+from .plume_edges import with_plume_edges as with_plume_edges
+from .quality import outside_fitted_range as outside_fitted_range
+from .quality import quality_flags as quality_flags
 from .radiance import brightness_temperature as brightness_temperature
 from .radiance import radiance as radiance
 from .reflectance import brf as brf
 from .reflectance import reflectance_factor as reflectance_factor
 from .standard_atmospheres import standard_atmosphere as standard_atmosphere
+from .state_checks import check_state as check_state

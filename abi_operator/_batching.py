@@ -33,11 +33,23 @@ _FEWEST_A_DEVICE = 4 * _VECTOR
 _GPU_TILE = 4096
 
 
-def tile_size(num_streams: int) -> int:
-    """Columns that are solved together, at most."""
+def tile_size(num_streams: int, dtype: Any) -> int:
+    """Columns that are solved together, at most.
+
+    The fewer, the more of a layer is in the cache next to the processor; the more, the less the
+    start of a kernel counts. Where a layer is one kernel (`_kernels`) a tile is also small enough
+    for that; float32 is beyond 8 streams not.
+    """
     if jax.default_backend() != "cpu":
         return _GPU_TILE
-    return 256 if num_streams <= 4 else 128 if num_streams <= 8 else 64 if num_streams <= 16 else 32
+    single = jnp.dtype(dtype) == jnp.float32
+    if num_streams <= 4:
+        return 64
+    if num_streams <= 8:
+        return 64 if single else 128
+    if num_streams <= 16:
+        return 128 if single else 64
+    return 64 if single else 32
 
 
 def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:

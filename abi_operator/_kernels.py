@@ -2,7 +2,7 @@
 
 To start a kernel takes a CPU as long as the arithmetic of 2 x 2 or 4 x 4 matrices on a tile of
 columns, and a layer has a hundred kernels. XLA compiles a call marked ``xla_cpu_small_call`` whole,
-as it does the smallest loops of any program; other backends do not know the mark.
+loops included, as it does the smallest loops of any program; other backends do not know the mark.
 
 The call is a primitive of its own, because a `jax.jit` is taken apart where derivatives are: into
 what is known and what is not, piece by piece, of which XLA then makes no kernel.
@@ -18,7 +18,11 @@ from jax.extend.core import ClosedJaxpr, Primitive, jaxpr_as_fun
 from jax.interpreters import ad, batching, mlir
 
 # Rows of matrices up to which a layer is one kernel: see `one_kernel`.
-_LARGEST, _LARGEST_OF_FLOAT32 = 8, 2
+_LARGEST, _LARGEST_OF_FLOAT32 = 8, 4
+
+# Bytes from which on XLA shares an operation among threads; not those that only move or hold data.
+_SHARED_FROM = 2**19
+_MOVING = ("broadcast_in_dim", "dynamic_update_slice", "reshape", "slice", "squeeze")
 
 _one_kernel = Primitive("one_kernel")
 _one_kernel.multiple_results = True
@@ -29,9 +33,10 @@ def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., An
 
     XLA has neither code in it for a ``dot`` nor for an operation that it would share among threads,
     and does not compile a program with one: an operation on half a megabyte, or of more arithmetic
-    than bytes on 20 kilobytes. With the tiles of `_batching` there is none up to 8 rows in float64,
-    nor up to 2 in float32, whose bytes are half as many; larger ones are left as they are. So are
-    derivatives of `function` and what `jax.vmap` makes of it, in which nobody has counted.
+    than bytes on 20 kilobytes. With the tiles of `_batching` there is none of the second kind up to
+    8 rows in float64, nor up to 4 in float32, whose bytes are half as many; larger ones are left as
+    they are. So is a function with an operation of the first kind (of very many layers), and so
+    are derivatives of `function` and what `jax.vmap` makes of it, in which nobody has counted.
 
     Parameters
     ----------
@@ -51,9 +56,22 @@ def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., An
             return function(*jax.tree.unflatten(structure, leaves))
 
         jaxpr, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
+        if _largest_operation(jaxpr.jaxpr) >= _SHARED_FROM:
+            return function(*args)
         return jax.tree.unflatten(jax.tree.structure(shape), _one_kernel.bind(*leaves, jaxpr=jaxpr))
 
     return call
+
+
+def _largest_operation(jaxpr: Any) -> int:
+    """Bytes of the largest result of an operation."""
+    sizes = [0]
+    for equation in jaxpr.eqns:
+        inner = [x for x in jax.tree.leaves(equation.params) if isinstance(x, ClosedJaxpr)]
+        sizes += [_largest_operation(x.jaxpr) for x in inner]
+        if not inner and equation.primitive.name not in _MOVING:
+            sizes += [x.aval.size * x.aval.dtype.itemsize for x in equation.outvars]
+    return max(sizes)
 
 
 @_one_kernel.def_impl

@@ -4,10 +4,15 @@ Every class is a frozen pytree of floating arrays. One column has the shapes wri
 of columns carries one more axis, leading, on every leaf. Layers and levels count from the top.
 """
 
+from typing import Any
+
 import equinox as eqx
 from jaxtyping import Array, Float
 
 from .geometry import Geometry
+
+LIQUID_OPTICS = ("mitchell", "mie")
+"""Ways to the optics of cloud droplets."""
 
 
 class LiquidCloud(eqx.Module):
@@ -19,10 +24,25 @@ class LiquidCloud(eqx.Module):
         Mass of liquid water in the layer per horizontal area. [kg m-2]
     number_path
         Number of droplets in the layer per horizontal area; read only where there is mass. [m-2]
+    optics
+        Where their optics are from: ``"mitchell"``, modified anomalous diffraction and the phase
+        function of Henyey and Greenstein, or ``"mie"``, Mie theory by table.
+
+    Raises
+    ------
+    ValueError
+        Where `optics` is neither.
     """
 
     mass_path: Float[Array, "*batch layer"]
     number_path: Float[Array, "*batch layer"]
+    optics: str = eqx.field(default="mitchell", static=True)
+
+    def __check_init__(self) -> None:
+        if self.optics not in LIQUID_OPTICS:
+            raise ValueError(
+                f"optics of LiquidCloud must be one of {LIQUID_OPTICS}; got {self.optics!r}."
+            )
 
 
 class Plume(eqx.Module):
@@ -61,8 +81,8 @@ class Plume(eqx.Module):
 class MiePlume(eqx.Module):
     """A vertically uniform aerosol layer of spheres, lognormal in size, by its effective radius.
 
-    As a `Plume`, but extinction relative to 550 nm, single-scattering albedo and asymmetry factor
-    of every band follow from Mie theory, by the table of the species.
+    As a `Plume`, but extinction relative to 550 nm, single-scattering albedo and phase function of
+    every band follow from Mie theory, by the table of the species.
 
     Parameters
     ----------
@@ -179,7 +199,8 @@ class State(eqx.Module):
     atmosphere
         Air, cloud and plumes.
     albedo
-        Lambertian (white-sky) albedo of the ground by band. [-]
+        Ground by band: its Lambertian (white-sky) albedo [-], or a surface with a reflectance of
+        its own (`surface.RossLi`, `surface.Ocean`), each of whose fields is one number per column.
     geometry
         Directions of the sun and of the satellite.
     surface_temperature
@@ -189,7 +210,7 @@ class State(eqx.Module):
     """
 
     atmosphere: Atmosphere
-    albedo: dict[str, Float[Array, "*batch"]]
+    albedo: dict[str, Any]
     geometry: Geometry
     surface_temperature: Float[Array, "*batch"] | None = None
     fire: Fire | None = None

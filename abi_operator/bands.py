@@ -12,8 +12,8 @@ from typing import NamedTuple
 class Band(NamedTuple):
     """One band: its name in ABI files and the centroid of its response. [um]
 
-    Centroids are those of GOES-16's spectral response [1]_ weighted by the solar spectrum; those
-    of GOES-17 to -19 differ by 1.4 nm or less, but by 6 nm in C04 and by 14 nm in C07.
+    Centroids are those of GOES-16's spectral response [1]_; those of GOES-17 to -19 differ by 1.4
+    nm or less, but by 6 nm in C04 and by 14 nm in C07.
 
     References
     ----------

@@ -16,18 +16,26 @@ from typing import Annotated, Any
 import jax
 import typer
 
-from .bands import GRASSO2013, check_bands
+from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence
 from .demo import write_demo
 from .files import output_folder
-from .scene import GOES_EAST
+from .guard.commands import jacobian
+from .microphysics import SCHEMES
+from .optics import ALL_GASES
+from .satellites import SATELLITES
+from .scene import CLASSES
 from .simulation import Report, Request, Species, open_scene, simulate_scene
+from .surface import EMISSIVITY_3900NM
 
 COMMANDS = "abi_operator.commands"
 """Group of the entry points by which other packages add commands."""
 
 # Albedo of the sea in the demonstration. [-]
 _DEMO_OCEAN_ALBEDO = 0.03
+
+_ALL, _NONE = "all", "none"
+_IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
 
 
 @contextmanager
@@ -50,11 +58,27 @@ def _print(report: Report, out: Path) -> None:
 def simulate(
     wrf: Annotated[Path, typer.Argument(metavar="WRFOUT", help="Output of WRF, any times.")],
     out: Annotated[Path, typer.Option(help="Folder for the result and its pictures.")],
+    time: Annotated[
+        int | None, typer.Option(min=0, help="The one time to simulate, counted from 0.")
+    ] = None,
+    bands: Annotated[
+        str, typer.Option(help=f"Bands to simulate, of {', '.join(BANDS)}; all: C01 to C07.")
+    ] = ",".join(GRASSO2013),
     albedo: Annotated[
         Path | None, typer.Option(help="MODIS albedo, MCD43A1 in NetCDF from AppEEARS.")
     ] = None,
     ocean_albedo: Annotated[
-        float | None, typer.Option(min=0, max=1, help="Albedo of water, in all bands.")
+        float | None, typer.Option(min=0, max=1, help="Albedo of water, in all bands but C07.")
+    ] = None,
+    broadband: Annotated[
+        bool, typer.Option(help="Let broadband albedo stand in for missing spectral bands.")
+    ] = False,
+    emissivity: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the ground in C07: a number, model (its own, broadband), or one of "
+            f"{', '.join(EMISSIVITY_3900NM)}."
+        ),
     ] = None,
     plume: Annotated[
         Path | None, typer.Option(help="Greyscale PNG, one pixel a column, north at the top.")
@@ -65,39 +89,72 @@ def simulate(
     plume_aod: Annotated[
         float, typer.Option(min=0, help="Optical depth at 550 nm where the plume is white.")
     ] = 2.0,
+    gases: Annotated[
+        str, typer.Option(help=f"Gases that absorb: all, none, or some of {', '.join(ALL_GASES)}.")
+    ] = _ALL,
+    hydrometeors: Annotated[
+        str,
+        typer.Option(help=f"Beside cloud water: all, none, or some of {', '.join(CLASSES)}."),
+    ] = _ALL,
+    microphysics: Annotated[
+        str | None,
+        typer.Option(
+            help="Scheme to assume in place of the model's where it gives no number of particles: "
+            f"{', '.join(SCHEMES)}."
+        ),
+    ] = None,
+    satellite: Annotated[str, typer.Option(help=f"One of {', '.join(SATELLITES)}.")] = "GOES-16",
     satellite_longitude: Annotated[
-        float, typer.Option(min=-180, max=360, help="In degrees, east positive.")
-    ] = GOES_EAST,
-    bands: Annotated[str, typer.Option(help="Bands to simulate.")] = ",".join(GRASSO2013),
-    broadband: Annotated[
-        bool, typer.Option(help="Let broadband albedo stand in for missing spectral bands.")
-    ] = False,
+        float | None,
+        typer.Option(min=-180, max=360, help="In degrees, east positive, if not as usual."),
+    ] = None,
     num_streams: Annotated[int, typer.Option(min=2, help="Streams of the solver, even.")] = 8,
 ) -> None:
     """Simulate what the imager would see of a scene in a weather model's output."""
     if num_streams % 2:
         raise typer.BadParameter(f"the number of streams is even; got {num_streams}.")
     try:
-        names = check_bands([name.strip() for name in bands.split(",")], GRASSO2013)
+        names = check_bands(_names(bands, _IMAGER_BANDS))
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     request = Request(
         wrf,
-        albedo,
-        ocean_albedo,
-        plume,
-        plume_species,
-        plume_aod,
-        satellite_longitude,
-        names,
-        broadband,
-        num_streams,
+        time=time,
+        bands=names,
+        albedo=albedo,
+        ocean_albedo=ocean_albedo,
+        broadband=broadband,
+        emissivity=_number(emissivity),
+        plume=plume,
+        plume_species=plume_species,
+        plume_aod=plume_aod,
+        gases=_names(gases, ALL_GASES),
+        hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
+        microphysics=microphysics,
+        satellite=satellite,
+        satellite_longitude=satellite_longitude,
+        num_streams=num_streams,
     )
     with one_sentence(), _user_warnings():
         scene = open_scene(request)
         with output_folder(out) as folder:
             report = simulate_scene(scene, folder)
         _print(report, out)
+
+
+def _names(text: str, everything: tuple[str, ...]) -> tuple[str, ...]:
+    """Names that are separated by commas; all of them, or none."""
+    if text in (_ALL, _NONE):
+        return everything if text == _ALL else ()
+    return tuple(name.strip() for name in text.split(","))
+
+
+def _number(text: str | None) -> float | str | None:
+    """A number where the text is one."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def demo(
@@ -109,7 +166,8 @@ def demo(
     with one_sentence(), _user_warnings():
         with output_folder(out) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
-            request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume)
+            # As in the paper, which neglects absorption by gases.
+            request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume, gases=())
             report = simulate_scene(open_scene(request), folder)
         _print(report, out)
     for entry in entry_points(group=COMMANDS, name="demo"):
@@ -140,6 +198,7 @@ def make_app() -> typer.Typer:
     app.callback()(_in_double_precision)
     app.command()(simulate)
     app.command()(demo)
+    app.add_typer(jacobian, name="jacobian")
     for entry in sorted(entry_points(group=COMMANDS), key=lambda entry: entry.name):
         command = None if entry.name == "demo" else _load(entry)
         if command is not None:

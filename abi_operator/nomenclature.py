@@ -5,12 +5,14 @@ Three Datasets follow each other, and each is described by names of this table:
 - the **model Dataset** that a reader returns: what a weather model wrote, in these names, SI,
   *top first* (layer 0 is the uppermost), dimensions ``time layer y x`` (``level`` for edges);
 - the **scenario**: one time of a scene (``layer y x``), completed to the top of the atmosphere,
-  with clouds as paths, surface albedo by band, angles in degrees and the plumes that were
-  specified. It is the truth, and everything that the operator reads;
-- the **result**: the scenario, the reflectances simulated from it and the optical depths they
-  contain. A retrieval reads it back.
+  with clouds as paths, surface albedo by band, angles in degrees, the plumes that were specified,
+  and where they are to be simulated gases, other hydrometeors and temperatures (`OPTIONAL`). It is
+  the truth, and everything that the operator reads;
+- the **result**: the scenario, the radiances and reflectances simulated from it and the optical
+  depths they contain. A retrieval reads it back.
 
-Variables of a plume begin with the species' name (``smoke_``, ``ash_``).
+Variables of a plume begin with the species' name (``smoke_``, ``ash_``), paths of hydrometeors with
+that of their class (``rain_``, ``snow_``).
 """
 
 from typing import NamedTuple
@@ -27,6 +29,16 @@ class Variable(NamedTuple):
 
 HORIZONTAL = ("y", "x")
 
+HYDROMETEORS: dict[str, str] = {
+    "cloud": "cloud water",
+    "rain": "rain",
+    "ice": "cloud ice",
+    "snow": "snow",
+    "graupel": "graupel",
+    "hail": "hail",
+}
+"""Classes of condensate in models, and how to say them. A scenario calls cloud water liquid."""
+
 MODEL: dict[str, Variable] = {
     "latitude": Variable(HORIZONTAL, "degrees_north", "latitude", "latitude"),
     "longitude": Variable(HORIZONTAL, "degrees_east", "longitude", "longitude"),
@@ -35,21 +47,36 @@ MODEL: dict[str, Variable] = {
         HORIZONTAL, "Pa", "pressure at the ground", "surface_air_pressure"
     ),
     "height": Variable(("level", "y", "x"), "m", "height above sea level", "altitude"),
-    "temperature": Variable(("layer", "y", "x"), "K", "air temperature", "air_temperature"),
+    "layer_temperature": Variable(
+        ("layer", "y", "x"), "K", "air temperature at mid-layer", "air_temperature"
+    ),
     "vapour_mixing_ratio": Variable(
         ("layer", "y", "x"), "kg kg-1", "water vapour per mass of dry air", "humidity_mixing_ratio"
     ),
-    "cloud_mixing_ratio": Variable(
-        ("layer", "y", "x"), "kg kg-1", "cloud water per mass of dry air"
+    **{
+        f"{name}_mixing_ratio": Variable(
+            ("layer", "y", "x"), "kg kg-1", f"{words} per mass of dry air"
+        )
+        for name, words in HYDROMETEORS.items()
+    },
+    **{
+        f"{name}_number_mixing_ratio": Variable(
+            ("layer", "y", "x"), "kg-1", f"particles of {words} per mass of dry air"
+        )
+        for name, words in HYDROMETEORS.items()
+    },
+    **{
+        f"{name}_effective_radius": Variable(
+            ("layer", "y", "x"), "m", f"effective radius of {words} by the model itself"
+        )
+        for name, words in HYDROMETEORS.items()
+    },
+    "surface_temperature": Variable(
+        HORIZONTAL, "K", "temperature of the ground's surface", "surface_temperature"
     ),
-    "cloud_number_mixing_ratio": Variable(
-        ("layer", "y", "x"), "kg-1", "cloud droplets per mass of dry air"
+    "surface_emissivity": Variable(
+        HORIZONTAL, "1", "broadband emissivity of the ground", "surface_longwave_emissivity"
     ),
-    "rain_mixing_ratio": Variable(("layer", "y", "x"), "kg kg-1", "rain per mass of dry air"),
-    "ice_mixing_ratio": Variable(("layer", "y", "x"), "kg kg-1", "cloud ice per mass of dry air"),
-    "snow_mixing_ratio": Variable(("layer", "y", "x"), "kg kg-1", "snow per mass of dry air"),
-    "graupel_mixing_ratio": Variable(("layer", "y", "x"), "kg kg-1", "graupel per mass of dry air"),
-    "hail_mixing_ratio": Variable(("layer", "y", "x"), "kg kg-1", "hail per mass of dry air"),
     "land_mask": Variable(HORIZONTAL, "1", "1 over land, 0 over water", "land_binary_mask"),
 }
 
@@ -75,6 +102,20 @@ SCENARIO: dict[str, Variable] = {
     "quality_flag": Variable(HORIZONTAL, "1", "what limits the use of this pixel", "quality_flag"),
 }
 
+OPTIONAL: dict[str, Variable] = {
+    "temperature": Variable(
+        ("level", "y", "x"), "K", "air temperature at the levels", "air_temperature"
+    ),
+    "surface_temperature": MODEL["surface_temperature"],
+    "vapour": Variable(("layer", "y", "x"), "kg m-2", "water vapour of the layer"),
+    "ozone": Variable(("layer", "y", "x"), "DU", "ozone of the layer"),
+    "carbon_dioxide": Variable((), "1", "mole fraction of carbon dioxide in dry air"),
+    "methane": Variable((), "1", "mole fraction of methane in dry air"),
+    "nitrous_oxide": Variable((), "1", "mole fraction of nitrous oxide in dry air"),
+}
+"""What a scenario has where gases or emission are simulated. Of hydrometeors other than cloud water
+it has ``{class}_mass_path`` and ``{class}_number_path`` (layer, y, x)."""
+
 PLUME: dict[str, Variable] = {
     "brightness": Variable(HORIZONTAL, "1", "horizontal weight of the plume, 0 to 1"),
     "base": Variable((), "m", "lower edge of the plume above the ground"),
@@ -92,10 +133,29 @@ RESULT: dict[str, Variable] = {
     "brf": Variable(
         ("band", "y", "x"), "1", "bidirectional reflectance factor, reflectance factor / mu0"
     ),
+    "radiance": Variable(
+        ("band", "y", "x"),
+        "W m-2 sr-1 um-1",
+        "radiance at the top of the atmosphere",
+        "toa_outgoing_radiance_per_unit_wavelength",
+    ),
     "rayleigh_optical_depth": Variable(("band", "y", "x"), "1", "optical depth of the air"),
     "liquid_optical_depth": Variable(("band", "y", "x"), "1", "optical depth of the cloud"),
 }
-"""The result has also ``{species}_optical_depth`` (band, y, x) and ``{species}_aod_550`` (y, x)."""
+"""The result has also ``{species}_optical_depth`` (band, y, x) and ``{species}_aod_550`` (y, x) of
+plumes, and ``{class}_optical_depth`` of hydrometeors."""
+
+OPTIONAL_RESULT: dict[str, Variable] = {
+    "brightness_temperature": Variable(
+        HORIZONTAL, "K", "brightness temperature in C07", "toa_brightness_temperature"
+    ),
+    "outside_fitted_range": Variable(
+        ("band", "y", "x"),
+        "1",
+        "share of hydrometeors' optical depth at sizes beyond those that optics were fitted to",
+    ),
+}
+"""What the result has where C07, and where hydrometeors beside cloud water, are simulated."""
 
 QUALITY_FLAGS: dict[str, int] = {
     "grazing_sun": 1,  # solar zenith angle above 80 degrees: plane-parallel air is a poor model
@@ -103,6 +163,9 @@ QUALITY_FLAGS: dict[str, int] = {
     "no_albedo": 4,  # the albedo file has no valid inversion here: nothing simulated
     "grazing_view": 8,  # view zenith angle above 80 degrees
     "out_of_sight": 16,  # satellite at or below the horizon: nothing simulated
+    "outside_fit": 32,  # more than 10 % of a band's optical depth at sizes that no fit covers
+    "ground_below_zero": 64,  # an anisotropic ground reflects less than nothing towards some view
+    "ground_above_one": 128,  # more light leaves an anisotropic ground than falls in
 }
 """Bits of ``quality_flag``; 0 is an unrestricted pixel."""
 
@@ -112,12 +175,17 @@ GRAZING_ZENITH = 80.0
 
 def variable(name: str) -> Variable | None:
     """Look a Dataset variable up by name; None where the project does not define it."""
-    for table in (RESULT, SCENARIO, MODEL):
+    for table in (RESULT, SCENARIO, OPTIONAL, OPTIONAL_RESULT, MODEL):
         if name in table:
             return table[name]
-    species, _, quantity = name.partition("_")
+    owner, _, quantity = name.partition("_")
+    words = HYDROMETEORS.get(owner, f"the {owner} plume")
     if quantity == "optical_depth":
-        return Variable(("band", "y", "x"), "1", f"optical depth of the {species} plume")
+        return Variable(("band", "y", "x"), "1", f"optical depth of {words}")
+    if quantity == "mass_path":
+        return Variable(("layer", "y", "x"), "kg m-2", f"{words} of the layer")
+    if quantity == "number_path":
+        return Variable(("layer", "y", "x"), "m-2", f"particles of {words} of the layer")
     if quantity == "aod_550":
-        return Variable(HORIZONTAL, "1", f"optical depth of the {species} plume at 550 nm")
+        return Variable(HORIZONTAL, "1", f"optical depth of {words} at 550 nm")
     return PLUME.get(quantity)

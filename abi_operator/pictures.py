@@ -12,6 +12,21 @@ _SMALLEST = 512
 _MISSING = 128  # mid grey
 
 
+def grey(values: np.ndarray, black: float, white: float) -> np.ndarray:
+    """Shades of grey (y, x, 3), 0 to 1, linear from one value to another; NaN stays NaN. [-]
+
+    Parameters
+    ----------
+    values
+        What to show (y, x).
+    black, white
+        Values that are black and white; those beyond are so, too. In infrared pictures the cold is
+        white.
+    """
+    shade = np.clip((np.asarray(values, np.float64) - black) / (white - black), 0, 1)
+    return np.repeat(shade[..., None], 3, axis=-1)
+
+
 def write_png(path: str | PathLike[str], rgb: np.ndarray) -> None:
     """Write a picture as PNG, north at its top and small scenes enlarged.
 

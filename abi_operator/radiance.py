@@ -7,17 +7,16 @@ simulated as radiance. Sunlight and emission are one solve.
 from collections.abc import Sequence
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from .atmosphere import State
-from .band_columns import band_columns, checked_bands, uniform
 from .bands import GRASSO2013
 from .optics import ALL_GASES
+from .optics_and_solver import Inputs, Options, solve
 from .planck import brightness_temperature as temperature_of
-from .planck import in_band_radiance
-from .satellites import check_satellite, gas_fit_covers, solar_irradiance
-from .solver import toa_radiance
-from .surface import surface_emission
+from .satellites import solar_irradiance
+from .state_checks import check_state, checked_bands, is_concrete, uniform
 
 THERMAL = ("C07",)
 """Bands whose emission is always simulated."""
@@ -41,7 +40,9 @@ def radiance(
 
     In bands that emit, levels shine by the Planck function of their temperature, averaged over
     the response, and the ground isotropically with :math:`(1 - a)[p B(T_f) + (1 - p) B(T_s)]`.
-    With the sun at or below the horizon emission is all there is.
+    With the sun at or below the horizon emission is all there is; with the satellite there it is
+    NaN. An anisotropic ground emits 1 minus its white-sky albedo to all sides, which makes the
+    energy right that leaves it and no more.
 
     Parameters
     ----------
@@ -67,15 +68,7 @@ def radiance(
         As `brf`, and if a temperature is missing, the satellite unknown, or the fit of gas
         absorption not made for the satellite's band (C04 of GOES-19).
     """
-    bands = checked_bands(state, bands)
-    check_satellite(satellite)
-    gases = tuple(gases)
-    for name in bands:
-        if gases and state.atmosphere.gases is not None and not gas_fit_covers(satellite, name):
-            raise ValueError(
-                f"the gas absorption of {name} is not that of {satellite}; leave the gases out "
-                "with gases=()."
-            )
+    bands = checked_bands(state, bands, gases, satellite)
     emitting = [x for x in bands if x in (THERMAL if state.fire is None else FIRE_BANDS)]
     missing = [
         name
@@ -87,25 +80,19 @@ def radiance(
     ]
     if emitting and missing:
         raise ValueError(f"emission in {emitting} needs {' and '.join(missing)} of the state.")
-    state, batch = uniform(state)
-    options = {
-        "num_streams": num_streams,
-        "num_modes": num_modes,
-        "num_doublings": num_doublings,
-    }
-    sun = _sunlight(state, bands, satellite, sun_distance)
-    found = {}
-    for group in (tuple(x for x in bands if x not in emitting), tuple(emitting)):
-        if not group:
-            continue
-        columns = band_columns(state, group, gases, num_streams + 1)
-        light = {"solar_irradiance": jnp.stack([sun[x] for x in group], axis=-1)}
-        if emitting and group == tuple(emitting):
-            light |= _emission(state, group, satellite)
-        light = {name: columns.repeated(x) for name, x in light.items()}
-        total = columns.summed(toa_radiance(**columns.layers, **light, **options))
-        found |= {x: total[..., k] for k, x in enumerate(group)}
-    return jnp.stack([found[x] for x in bands], axis=-1).reshape(*batch, len(bands))
+    state, _ = uniform(state)
+    if is_concrete(state):
+        check_state(state)
+    mu0 = state.geometry.mu0
+    share = jnp.where(mu0 > 0, 1 / jnp.asarray(sun_distance, mu0.dtype) ** 2, 0)
+    sun = {x: solar_irradiance(x, satellite) * share for x in bands}
+    options = Options(bands, tuple(emitting), satellite, tuple(gases), num_streams, num_modes)
+    found = solve(Inputs(state, {x: sun[x] for x in emitting}), options, num_doublings)
+    # What is no emission is the sun's times its cosine, which may be below 0 only where it is 0.
+    reflected = jnp.where(mu0 > 0, mu0 / np.pi, 0)
+    factor = [jnp.ones_like(mu0) if x in emitting else sun[x] * reflected for x in bands]
+    seen = jnp.cos(state.geometry.view_zenith) > 0
+    return jnp.where(seen[..., None], found * jnp.stack(factor, axis=-1), jnp.nan)
 
 
 def brightness_temperature(
@@ -120,28 +107,3 @@ def brightness_temperature(
     """
     seen = radiance(state, ("C07",), satellite=satellite, **options)
     return temperature_of(seen[..., 0], "C07", satellite)
-
-
-def _sunlight(state: State, bands: tuple[str, ...], satellite: str, distance) -> dict[str, Array]:
-    """Solar irradiance of each column in each band, 0 by night."""
-    mu0 = state.geometry.mu0
-    shares = jnp.where(mu0 > 0, 1 / jnp.asarray(distance, mu0.dtype) ** 2, 0)
-    return {x: solar_irradiance(x, satellite) * shares for x in bands}
-
-
-def _emission(state: State, bands: tuple[str, ...], satellite: str) -> dict[str, Array]:
-    levels, ground = [], []
-    at_levels, at_ground = state.atmosphere.temperature, state.surface_temperature
-    assert at_levels is not None and at_ground is not None  # refused at the door
-    for name in bands:
-        levels.append(in_band_radiance(at_levels, name, satellite))
-        background = in_band_radiance(at_ground, name, satellite)
-        fire = {}
-        if state.fire is not None:
-            hot = in_band_radiance(state.fire.temperature, name, satellite)
-            fire = {"fire": hot, "fraction": state.fire.fraction}
-        ground.append(surface_emission(state.albedo[name], background, **fire))
-    return {
-        "planck_levels": jnp.stack(levels, axis=-2),
-        "surface_emission": jnp.stack(ground, axis=-1),
-    }

@@ -13,16 +13,17 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .atmosphere import State
-from .band_columns import band_columns, checked_bands, uniform
 from .bands import GRASSO2013
 from .optics import ALL_GASES
-from .solver import toa_brf
+from .optics_and_solver import Inputs, Options, solve
+from .state_checks import check_state, checked_bands, is_concrete, uniform
 
 
 def brf(
     state: State,
     bands: Sequence[str] = GRASSO2013,
     *,
+    satellite: str = "GOES-16",
     gases: Sequence[str] = ALL_GASES,
     num_streams: int = 8,
     num_modes: int | None = None,
@@ -31,21 +32,25 @@ def brf(
     """Bidirectional reflectance factor at the top of the atmosphere, by band. [-]
 
     Differentiable in every floating leaf of the state, forward and reverse; may be called under
-    `jax.jit`, `jax.vmap` and `jax.grad`.
+    `jax.jit`, `jax.vmap` and `jax.grad`. NaN, with derivative 0, where the sun or the satellite
+    stands at or below the horizon (`quality_flags`).
 
     Parameters
     ----------
     state
-        One column, or a batch of columns: the same axes leading on every leaf. The sun and the
-        satellite stand above the horizon.
+        One column, or a batch of columns: the same axes leading on every leaf.
     bands
         Names of the bands to simulate, each present in the state's albedo and plumes.
+    satellite
+        Optics are those of GOES-16 for all; that of GOES-19 is refused where its gas absorption is
+        another (C04).
     gases
         Which of the atmosphere's gases absorb; ``()`` leaves them all out.
     num_streams, num_modes, num_doublings
-        Accuracy and cost of the solver; see `solver.toa_brf`. Under a transformation, where the
-        layers' optical depths cannot be read, `num_doublings` None takes enough for any cloud,
-        which costs two to three times the time of a sufficient number.
+        Accuracy and cost of the solver; see `solver.toa_brf`. Where optical depths can be read,
+        outside `jax.jit` and loops (derivatives and `jax.vmap` included), `num_doublings` None
+        takes a number that is exact for the thickest layer. Inside, it takes enough for layers of
+        1000 and gives NaN in columns with a thicker one.
 
     Returns
     -------
@@ -54,40 +59,58 @@ def brf(
     Raises
     ------
     ValueError
-        If a band is unknown or missing from the state, or a leaf's axes do not match.
+        If a band or the satellite is unknown, a band missing from the state, a leaf's axes do not
+        match, or (where values can be read) as `check_state`.
     """
-    bands = checked_bands(state, bands)
-    state, batch = uniform(state)
-    columns = band_columns(state, bands, tuple(gases), num_streams + 1)
-    terms = toa_brf(
-        **columns.layers,
-        num_streams=num_streams,
-        num_modes=num_modes,
-        num_doublings=num_doublings,
+    options = Options(
+        checked_bands(state, bands, gases, satellite),
+        (),
+        satellite,
+        tuple(gases),
+        num_streams,
+        num_modes,
     )
-    return columns.summed(terms).reshape(*batch, len(bands))
+    state, _ = uniform(state)
+    if is_concrete(state):
+        check_state(state)
+    return _lit(state, solve(Inputs(state, {}), options, num_doublings), jnp.nan)
 
 
 def reflectance_factor(
     state: State,
     bands: Sequence[str] = GRASSO2013,
     *,
+    satellite: str = "GOES-16",
     gases: Sequence[str] = ALL_GASES,
     num_streams: int = 8,
     num_modes: int | None = None,
     num_doublings: int | None = None,
 ) -> Float[Array, "*batch band"]:
-    """Reflectance factor pi d^2 L / E0 as in ABI files, mu0 times `brf`. [-]
+    """Reflectance factor pi d^2 L / E0 as in ABI files, mu0 times `brf`, and 0 by night. [-]
 
-    Arguments and errors are those of `brf`.
+    Arguments and errors are those of `brf`; where the satellite is out of sight it is NaN.
     """
     value = brf(
         state,
         bands,
+        satellite=satellite,
         gases=gases,
         num_streams=num_streams,
         num_modes=num_modes,
         num_doublings=num_doublings,
     )
-    mu0 = jnp.cos(jnp.asarray(state.geometry.solar_zenith, value.dtype))
-    return mu0[..., None] * value
+    mu0, mu = (
+        jnp.cos(jnp.asarray(x, value.dtype))[..., None]
+        for x in (state.geometry.solar_zenith, state.geometry.view_zenith)
+    )
+    # Where brf is NaN its derivative in mu0 would be too.
+    lit = (mu0 > 0) & (mu > 0)
+    by_day = jnp.where(lit, mu0, 0) * jnp.where(lit, value, 0)
+    return jnp.where(mu > 0, by_day, jnp.nan)
+
+
+def _lit(state: State, value: Array, otherwise: float) -> Array:
+    """`value` where the sun is up and the satellite in sight."""
+    geometry = state.geometry
+    up = (jnp.cos(geometry.solar_zenith) > 0) & (jnp.cos(geometry.view_zenith) > 0)
+    return jnp.where(up[..., None], value, otherwise)

@@ -14,7 +14,7 @@ References
 
 from typing import NamedTuple
 
-from .bands import check_bands
+from .bands import BANDS, check_bands
 
 SATELLITES = ("GOES-16", "GOES-17", "GOES-18", "GOES-19")
 
@@ -65,18 +65,9 @@ _SOLAR_IRRADIANCE = {
     },
 }
 
-# Centroid of the response times the solar spectrum. [um] (integrated)
+# Centroid of the response. [um] (integrated; those of GOES-16 are what the bands are listed by)
 _CENTROID_UM = {
-    "GOES-16": {
-        "C01": 0.4711,
-        "green": 0.555,
-        "C02": 0.6396,
-        "C03": 0.8644,
-        "C04": 1.3732,
-        "C05": 1.6095,
-        "C06": 2.2427,
-        "C07": 3.8934,
-    },
+    "GOES-16": {name: band.wavelength_um for name, band in BANDS.items()},
     "GOES-17": {
         "C01": 0.4712,
         "green": 0.555,
@@ -201,7 +192,7 @@ def solar_irradiance(band: str, satellite: str = "GOES-16") -> float:
 
 
 def centroid_um(band: str, satellite: str = "GOES-16") -> float:
-    """Centroid of a band's response weighted by the solar spectrum. [um]"""
+    """Centroid of a band's response. [um]"""
     return _look_up(_CENTROID_UM, band, satellite)
 
 

@@ -1,7 +1,7 @@
 """From a user's files to a folder with the simulated scene.
 
 This is where readers and scenes meet: `open_scene` opens and checks everything, `simulate_scene`
-writes the result and a picture of every time.
+writes the result and pictures of every time.
 """
 
 import warnings
@@ -24,15 +24,23 @@ from .files import (
     wrf_coordinates,
 )
 from .nomenclature import QUALITY_FLAGS
-from .optics import ash, smoke
-from .pictures import write_png
+from .optics import ALL_GASES, ash, smoke
+from .pictures import grey, write_png
 from .products import natural_color
+from .radiance import THERMAL
 from .scene import (
-    GOES_EAST,
+    CLASSES,
+    Emissivity,
     PlumeSpecification,
+    check_absorption,
+    check_classes,
+    check_gases,
     check_ground,
+    check_microphysics,
+    classes_present,
     completion_heights,
     highest_top,
+    nearest_standard_atmosphere,
     row_blocks,
     run,
     scenario,
@@ -40,6 +48,15 @@ from .scene import (
 
 RESULT = "result.nc"
 
+# Attributes of the scene that say where a quantity comes from, and what to call it.
+_SOURCES = {
+    "surface_albedo_source": "albedo of the ground",
+    "emissivity_source": "emissivity of the ground in C07",
+    "surface_temperature_source": "temperature of the ground",
+}
+
+# Brightness temperatures that are black and white in a picture. [K]
+_GREYS = (320.0, 220.0)
 # Atmospheric columns in memory at a time.
 _BLOCK_COLUMNS = 16384
 
@@ -66,10 +83,16 @@ class Request(NamedTuple):
         Picture of a plume, as `files.read_plume` takes it.
     plume_species, plume_aod
         What the plume is made of; optical depth at 550 nm where the picture is white. [-]
-    satellite_longitude
-        Degrees, east positive.
     bands, broadband
         Bands to simulate, and whether broadband albedo may stand in for a missing one.
+    emissivity
+        Of the ground in C07, as `scene.scenario` takes it.
+    gases, hydrometeors, microphysics
+        As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
+    satellite, satellite_longitude
+        Name; degrees, east positive, where it does not stand at its usual place.
+    time
+        Index of the one time to simulate; None for all. [-]
     num_streams
         Streams of the solver.
     """
@@ -80,9 +103,15 @@ class Request(NamedTuple):
     plume: Path | None = None
     plume_species: Species = Species.SMOKE
     plume_aod: float = 2.0
-    satellite_longitude: float = GOES_EAST
     bands: tuple[str, ...] = GRASSO2013
     broadband: bool = False
+    emissivity: Emissivity | None = None
+    gases: tuple[str, ...] = ALL_GASES
+    hydrometeors: tuple[str, ...] | None = None
+    microphysics: str | None = None
+    satellite: str = "GOES-16"
+    satellite_longitude: float | None = None
+    time: int | None = None
     num_streams: int = 8
 
 
@@ -97,20 +126,29 @@ class Scene(NamedTuple):
         As `files.wrf_coordinates` returns.
     albedo, plumes
         What was read.
+    chosen_times
+        Indices of the times to simulate. [-]
     added_heights
         Of the levels that complete the columns. [m]
+    hydrometeors
+        Classes that the scene has beside cloud water.
+    standard_atmosphere
+        Name of that which completes the columns.
     """
 
     request: Request
     coordinates: xr.Dataset
     albedo: xr.Dataset | None
     plumes: dict[str, PlumeSpecification]
+    chosen_times: tuple[int, ...]
     added_heights: tuple[float, ...]
+    hydrometeors: tuple[str, ...]
+    standard_atmosphere: str
 
     @property
     def times(self) -> np.ndarray:
-        """Times of the model output."""
-        return self.coordinates["time"].values
+        """Times to simulate."""
+        return self.coordinates["time"].values[list(self.chosen_times)]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -120,23 +158,44 @@ class Scene(NamedTuple):
 
 def open_scene(request: Request) -> Scene:
     """Open and check all that a request names; whatever is wrong is an `InputError`."""
-    coordinates = wrf_coordinates(request.wrf)
+    check_absorption(request.satellite, request.bands, check_gases(request.gases))
+    check_classes(request.hydrometeors or ())
+    check_microphysics(request.microphysics)
+    coordinates = wrf_coordinates(request.wrf, request.time or 0)
     shape = coordinates.sizes["y"], coordinates.sizes["x"]
+    times = tuple(range(coordinates.sizes["time"])) if request.time is None else (request.time,)
     plumes = {}
     if request.plume is not None:
         brightness = read_plume(request.plume, shape)
         kind = {Species.SMOKE: smoke, Species.ASH: ash}[request.plume_species]
         plume = kind(request.plume_aod, bands=request.bands)
         plumes[str(request.plume_species)] = PlumeSpecification(plume, brightness)
+    solar = tuple(band for band in request.bands if band not in THERMAL)
     albedo = None
-    if request.albedo is not None:
-        albedo = read_mcd43a1(request.albedo, request.bands, broadband=request.broadband)
-    tops = []
-    for time in range(coordinates.sizes["time"]):
-        check_ground(wrf_coordinates(request.wrf, time), albedo, request.ocean_albedo)
+    if request.albedo is not None and solar:
+        albedo = read_mcd43a1(request.albedo, solar, broadband=request.broadband)
+    tops, present = [], set()
+    for time in times:
+        place = wrf_coordinates(request.wrf, time)
+        check_ground(place, request.bands, albedo, request.ocean_albedo, request.emissivity)
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
-            tops.append(highest_top(read_wrf(request.wrf, time, rows)))
-    return Scene(request, coordinates, albedo, plumes, completion_heights(max(tops)))
+            model = read_wrf(request.wrf, time, rows)
+            tops.append(highest_top(model))
+            present.update(classes_present(model, request.microphysics))
+    return Scene(
+        request,
+        coordinates,
+        albedo,
+        plumes,
+        times,
+        completion_heights(max(tops)),
+        tuple(x for x in CLASSES if x in present)
+        if request.hydrometeors is None
+        else request.hydrometeors,
+        nearest_standard_atmosphere(
+            coordinates["latitude"].values, coordinates["time"].values[times[0]]
+        ),
+    )
 
 
 class Report(NamedTuple):
@@ -153,11 +212,21 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         scenario,
         albedo=scene.albedo,
         ocean_albedo=request.ocean_albedo,
+        emissivity=request.emissivity,
         plumes=scene.plumes,
+        satellite=request.satellite,
         satellite_longitude=request.satellite_longitude,
         bands=request.bands,
+        gases=request.gases,
+        hydrometeors=scene.hydrometeors,
+        microphysics=request.microphysics,
+        standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )
+
+    def read_block(time: int, rows: slice) -> xr.Dataset:
+        return specify(read_wrf(request.wrf, scene.chosen_times[time], rows), rows=rows)
+
     with ResultWriter(
         folder / RESULT,
         times=scene.times,
@@ -165,7 +234,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         moving=bool(scene.coordinates.attrs["moving_nest"]),
     ) as writer:
         account = run(
-            lambda time, rows: specify(read_wrf(request.wrf, time, rows), rows=rows),
+            read_block,
             scene.times,
             scene.shape,
             writer.write,
@@ -181,18 +250,25 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
 
 
 def _draw(result: xr.Dataset, folder: Path) -> list[str]:
-    """Draw every time in natural colours, where the bands for it were simulated."""
+    """Draw every time in natural colours and in C07, where the bands for it were simulated."""
     colours = ("C01", "C02", "C03")
-    if not set(colours) <= set(result["band"].values.tolist()):
-        warnings.warn(f"no pictures were drawn: they need {', '.join(colours)}.", stacklevel=2)
-        return []
+    coloured = set(colours) <= set(result["band"].values.tolist())
+    warm = "brightness_temperature" in result
+    if not (coloured or warm):
+        warnings.warn(
+            f"no pictures were drawn: they need {', '.join(colours)}, or C07.", stacklevel=2
+        )
     names = []
     for time in result["time"].values:
-        brf = result["brf"].sel(time=time)
-        rgb = natural_color({band: brf.sel(band=band).values for band in colours})
+        image = result.sel(time=time)
         stamp = np.datetime_as_string(time, unit="s").replace(":", "")
-        names.append(f"natural_color_{stamp}.png")
-        write_png(folder / names[-1], np.asarray(rgb))
+        if coloured:
+            brf = {band: image["brf"].sel(band=band).values for band in colours}
+            names.append(f"natural_color_{stamp}.png")
+            write_png(folder / names[-1], np.asarray(natural_color(brf)))
+        if warm:
+            names.append(f"C07_{stamp}.png")
+            write_png(folder / names[-1], grey(image["brightness_temperature"].values, *_GREYS))
     return names
 
 
@@ -214,10 +290,16 @@ def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
     yield f"air above {pressure} hPa: {account['air_above_model']}"
     if account["assumed_droplet_number_count"]:
         yield f"droplet number, assumed: {account['assumed_droplet_number']}"
-    kinds = str(account.get("unsimulated_condensate")).replace("; ", ", ")
-    for name, fate in (
-        ("unsimulated_condensate_share", f"not simulated ({kinds})"),
-        ("ice_as_droplets_share", "ice, simulated as droplets"),
-    ):
-        if account[name]:
-            yield f"{100 * float(account[name]):.2g} % of the condensate's mass: {fate}"
+    if "standard_atmosphere" in account:
+        yield f"ozone, and vapour and temperature above: {account['standard_atmosphere']}"
+    yield f"gases that absorb: {account['gases']}"
+    for name in CLASSES:
+        if f"assumed_{name}_number_count" in account:
+            yield f"number of {name}, assumed: as the microphysics {account['microphysics']} does"
+    for name, words in _SOURCES.items():
+        if name in account:
+            yield f"{words}: {account[name]}"
+    if account["unsimulated_condensate_share"]:
+        share = 100 * float(account["unsimulated_condensate_share"])
+        kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")
+        yield f"{share:.2g} % of the condensate's mass: not simulated ({kinds})"

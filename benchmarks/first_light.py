@@ -44,6 +44,7 @@ def read(inputs):
         albedo=read_mcd43a1(inputs.albedo, GRASSO2013),
         ocean_albedo=OCEAN_ALBEDO,
         plumes={"smoke": plume},
+        gases=(),
     )
 
 

@@ -3,22 +3,17 @@
     MIEPYTHON_USE_JIT=1 python benchmarks/make_aerosol_tables.py [--output aerosol_mie.nc]
 
 writes ``abi_operator/optics/tables/aerosol_mie.nc`` (classic NetCDF), for spheres of each species
-in `SPECIES` and every band; another species is another entry there. It takes half a minute with
-numba, and many times that without (no MIEPYTHON_USE_JIT). Names are arrays of characters, padded by
-spaces. Variables are
+in `SPECIES` and every band; another species is another entry there. It takes a quarter of an hour
+with numba, and many times that without (no MIEPYTHON_USE_JIT). The schema is that of
+`mie_ensembles`, with extinction over that at 0.550 um, and
 
 | variable | axes | unit | meaning |
 | --- | --- | --- | --- |
-| species_name, band_name | species or band, character | | what the other axes stand for |
-| wavelength_um | band | um | centroid of the band |
-| effective_radius_um | species, radius | um | of the first mode, equidistant in its logarithm |
 | log_width | species, mode | - | standard deviation of ln r in each lognormal mode |
 | second_mode_effective_radius_um | species | um | does not follow the first mode's |
 | second_mode_volume_ratio | species | - | its volume over that of the first, 0 where there is one |
-| refractive_index_real, refractive_index_imaginary | species, band | - | n and k of n - ik |
-| relative_extinction | species, band, radius | - | extinction over that at 0.550 um |
-| coalbedo | species, band, radius | - | 1 - single-scattering albedo |
-| asymmetry | species, band, radius | - | mean cosine of the scattering angle |
+
+The effective radius is that of the first mode.
 """
 
 import argparse
@@ -27,7 +22,7 @@ from typing import NamedTuple
 
 import miepython
 import numpy as np
-from scipy.io import netcdf_file
+from mie_ensembles import population, tabulate, write
 
 from abi_operator.bands import BANDS
 
@@ -35,6 +30,7 @@ OUTPUT = Path(__file__).parents[1] / "abi_operator" / "optics" / "tables" / "aer
 REFERENCE_UM = 0.550
 # Equidistant in their logarithm, 5 standard deviations of area beyond every size distribution.
 NUM_RADII = 41
+NUM_NODES = 80  # of the phase function
 SPHERE_RADIUS_UM = np.geomspace(0.002, 600.0, 20000)
 
 
@@ -132,80 +128,66 @@ def volume_weights(effective_radius_um: np.ndarray | float, log_width: float) ->
     return weight / weight.sum(axis=-1, keepdims=True)
 
 
-def coefficients(species: Species, index: complex, wavelength_um: float) -> np.ndarray:
-    """Extinction, absorption and asymmetry times scattering, per volume, against radius."""
-    x = 2 * np.pi * SPHERE_RADIUS_UM / wavelength_um
-    q_ext, q_sca, _, g = miepython.efficiencies_mx(index, x)
-    spheres = np.stack([q_ext, q_ext - q_sca, q_sca * g]) / SPHERE_RADIUS_UM
-    first = spheres @ volume_weights(species.effective_radius_um, species.log_width).T
-    second = spheres @ volume_weights(species.second_radius_um, species.second_log_width)
-    return first + species.second_volume * second[:, None]
-
-
-def optics(species: Species) -> dict[str, np.ndarray]:
-    """Relative extinction, co-albedo and asymmetry factor, (band, radius). [-]
+def table(name: str) -> dict[str, np.ndarray]:
+    """Variables of one species, (band, ...).
 
     The index at 0.550 um is that of the green band, 5 nm away.
     """
-    reference = coefficients(species, species.refractive_index["green"], REFERENCE_UM)[0]
-    bands = [
-        coefficients(species, species.refractive_index[b.name], b.wavelength_um)
-        for b in BANDS.values()
-    ]
-    extinction, absorption, directed = np.stack(bands, axis=1)
-    return {
-        "relative_extinction": extinction / reference,
-        "coalbedo": absorption / extinction,
-        "asymmetry": directed / (extinction - absorption),
-    }
+    species = SPECIES[name]
+    first = volume_weights(species.effective_radius_um, species.log_width)
+    second = volume_weights(species.second_radius_um, species.second_log_width)
+    areas = (first + species.second_volume * second) / SPHERE_RADIUS_UM
+    x = 2 * np.pi * SPHERE_RADIUS_UM
+    q_ext, *_ = miepython.efficiencies_mx(species.refractive_index["green"], x / REFERENCE_UM)
+    bands = []
+    for band in BANDS.values():
+        index = species.refractive_index[band.name]
+        bands.append(population(index, x / band.wavelength_um, areas))
+        print(name, band.name, flush=True)
+    extinction = np.stack([b.extinction for b in bands]) / (areas @ q_ext)
+    return {"extinction": extinction} | tabulate(bands, bands, NUM_NODES)
 
 
-def write(path: Path) -> None:
+def write_table(path: Path) -> None:
     """Write the table."""
-    rows = list(SPECIES.values())
-    computed = {name: optics(species) for name, species in SPECIES.items()}
-    axes = {"species": len(rows), "band": len(BANDS), "radius": NUM_RADII}
-    axes |= {"mode": 2, "character": max(map(len, (*SPECIES, *BANDS)))}
-    index = np.array([[s.refractive_index[band] for band in BANDS] for s in rows])
-    numbers = {
-        "wavelength_um": ("um", ("band",), [b.wavelength_um for b in BANDS.values()]),
-        "effective_radius_um": ("um", ("species", "radius"), [s.effective_radius_um for s in rows]),
-        "log_width": ("1", ("species", "mode"), [(s.log_width, s.second_log_width) for s in rows]),
-        "second_mode_effective_radius_um": ("um", ("species",), [s.second_radius_um for s in rows]),
-        "second_mode_volume_ratio": ("1", ("species",), [s.second_volume for s in rows]),
-        "refractive_index_real": ("1", ("species", "band"), np.real(index)),
-        "refractive_index_imaginary": ("1", ("species", "band"), -np.imag(index)),
+    rows = SPECIES.values()
+    spheres = (
+        f"sums over {SPHERE_RADIUS_UM.size} radii of spheres, {SPHERE_RADIUS_UM[0]:g} to "
+        f"{SPHERE_RADIUS_UM[-1]:g} um, equidistant in their logarithm; extinction is relative "
+        f"to {REFERENCE_UM} um with the refractive index of the green band"
+    )
+    attributes = {
+        "title": "Optics of aerosols in the bands of the Advanced Baseline Imager, Mie theory",
+        "source": f"miepython {miepython.__version__}, benchmarks/make_aerosol_tables.py",
+        "comment": spheres,
     }
-    for name in ("relative_extinction", "coalbedo", "asymmetry"):
-        values = [computed[species][name] for species in SPECIES]
-        numbers[name] = ("1", ("species", "band", "radius"), values)
-
-    with netcdf_file(path, "w", version=2) as file:
-        file.title = "Optics of aerosols in the bands of the Advanced Baseline Imager, Mie theory"
-        file.source = f"miepython {miepython.__version__}, benchmarks/make_aerosol_tables.py"
-        file.comment = (
-            f"sums over {SPHERE_RADIUS_UM.size} radii of spheres, {SPHERE_RADIUS_UM[0]:g} to "
-            f"{SPHERE_RADIUS_UM[-1]:g} um, equidistant in their logarithm; extinction is relative "
-            f"to {REFERENCE_UM} um with the refractive index of the green band"
-        )
-        for name, species in SPECIES.items():
-            setattr(file, f"sources_of_{name}", species.sources)
-        for name, size in axes.items():
-            file.createDimension(name, size)
-        for name, words in (("species", SPECIES), ("band", BANDS)):
-            characters = np.array([list(w.ljust(axes["character"])) for w in words], "S1")
-            file.createVariable(f"{name}_name", "S1", (name, "character"))[:] = characters
-        for name, (unit, dimensions, values) in numbers.items():
-            variable = file.createVariable(name, "f8", dimensions)
-            variable[:] = np.asarray(values)
-            variable.units = unit
+    write(
+        path,
+        attributes | {f"sources_of_{name}": s.sources for name, s in SPECIES.items()},
+        {name: s.effective_radius_um for name, s in SPECIES.items()},
+        {name: s.refractive_index for name, s in SPECIES.items()},
+        {name: table(name) for name in SPECIES},
+        {
+            "log_width": (
+                "1",
+                ("species", "mode"),
+                [(s.log_width, s.second_log_width) for s in rows],
+            ),
+            "second_mode_effective_radius_um": (
+                "um",
+                ("species",),
+                [s.second_radius_um for s in rows],
+            ),
+            "second_mode_volume_ratio": ("1", ("species",), [s.second_volume for s in rows]),
+        },
+    )
 
 
 def main() -> None:
     """Write the table to the path given."""
     parser = argparse.ArgumentParser(description="Write the table of aerosol optics.")
     parser.add_argument("--output", type=Path, default=OUTPUT)
-    write(parser.parse_args().output)
+    write_table(parser.parse_args().output)
 
 
 if __name__ == "__main__":

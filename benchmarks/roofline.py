@@ -58,7 +58,7 @@ def arithmetic(cores):
 
 def small_products(num_streams, cores):
     """Multiply-adds per second of all cores in products of cores, one tile after the other."""
-    n, tile, rounds = num_streams // 2, tile_size(num_streams), 1000
+    n, tile, rounds = num_streams // 2, tile_size(num_streams, np.float64), 1000
     a = np.random.default_rng(0).uniform(0, 1 / n, (n, n, tile))
     a = [jax.device_put(a, d) for d in jax.local_devices()]
     one = jax.jit(lambda a: jax.lax.fori_loop(0, rounds, lambda _, x: matmul(a, x), a))

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from abi_operator import BANDS, Atmosphere, Plume, State, reflectance_factor
-from abi_operator.optics import column_optics
+from abi_operator.optics import ALL_GASES, column_optics
 from abi_operator.solver import sufficient_doublings
 
 from .state_vector import StateVector
@@ -29,6 +29,8 @@ class ForwardModel(eqx.Module):
         ``vector.aod_limit``, which `prepared` takes care of.
     species
         Name of the plume that is retrieved.
+    gases
+        Gases of the state that absorb.
     """
 
     vector: StateVector
@@ -36,6 +38,7 @@ class ForwardModel(eqx.Module):
     num_streams: int = eqx.field(static=True, default=8)
     num_doublings: int | None = eqx.field(static=True, default=None)
     species: str = eqx.field(static=True, default="smoke")
+    gases: tuple[str, ...] = eqx.field(static=True, default=ALL_GASES)
 
     def state(self, x: Float[Array, "*batch x"], state: State) -> State:
         """Put x into a state."""
@@ -47,6 +50,7 @@ class ForwardModel(eqx.Module):
         return reflectance_factor(
             self.state(x, state),
             self.bands,
+            gases=self.gases,
             num_streams=self.num_streams,
             num_doublings=self.num_doublings,
         )
@@ -77,7 +81,7 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
     atmospheres = forward.state(thickest, states).atmosphere
 
     def largest_tau(atmosphere: Atmosphere) -> Float[Array, ""]:
-        optics = [column_optics(atmosphere, BANDS[band]) for band in forward.bands]
+        optics = [column_optics(atmosphere, BANDS[band], forward.gases) for band in forward.bands]
         return jnp.max(jnp.stack([jnp.max(layers.tau) for layers in optics]))
 
     max_tau = jnp.max(jax.jit(jax.vmap(largest_tau))(atmospheres))

@@ -11,7 +11,7 @@ from abi_operator import State
 from abi_operator.bands import GRASSO2013, check_bands
 from abi_operator.files import InputError
 from abi_operator.nomenclature import PLUME, SCENARIO
-from abi_operator.scene import column_states
+from abi_operator.scene import column_states, gases_of
 
 from .forward import ForwardModel, plume_by_band, prepared
 from .inverse import DEFAULT_MINIMISER, Minimiser
@@ -43,8 +43,8 @@ def retrieve_smoke(
 ) -> xr.Dataset:
     """Retrieve smoke from the result of a simulation, each pixel on its own, in float64.
 
-    Ground, cloud, air, height and spectrum of the smoke are known from the scenario in the result;
-    its brightness serves as plume mask, and its optical depth is not looked at.
+    Ground, cloud, air and its gases, height and spectrum of the smoke are known from the scenario
+    in the result; its brightness serves as plume mask, and its optical depth is not looked at.
 
     Parameters
     ----------
@@ -97,7 +97,9 @@ def retrieve_smoke(
     if attempted.any():
         with jax.enable_x64(True):
             observations, states = _gather(images, attempted, bands)
-            forward = ForwardModel(vector, bands, num_streams, species=_SPECIES)
+            forward = ForwardModel(
+                vector, bands, num_streams, species=_SPECIES, gases=gases_of(dataset)
+            )
             retrieved = retrieve_pixels(
                 prepared(forward, states),
                 observations,

@@ -9,13 +9,14 @@ ROOT = Path(__file__).parents[1]
 
 FLOORS = [
     {"cli"},
-    {"simulation"},
+    {"guard", "simulation"},
     {"commands", "demo", "scene"},
     {"files", "instrument", "pictures", "products"},
-    {"radiance", "reflectance"},
+    {"quality", "radiance", "reflectance"},
+    {"optics_and_solver", "state_checks"},
     {"band_columns"},
     {"optics", "solver", "surface"},
-    {"microphysics", "optical_properties", "standard_atmospheres"},
+    {"microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
     {"geometry", "planck"},
     {"satellites"},
@@ -91,6 +92,8 @@ def test_retrievals_use_public_names_only():
 
 def test_imports_stand_at_the_head_of_files():
     for path in [*sources("abi_operator"), *sources("retrievals")]:
+        if "plugin" in path.parts:  # which pytest loads before JAX may be
+            continue
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.FunctionDef):
                 inner = [x for x in ast.walk(node) if isinstance(x, ast.Import | ast.ImportFrom)]

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..files.modis_bands import WHITE_SKY
+from ..surface.ross_li import WHITE_SKY
 from .landscape import Landscape
 
 # White-sky albedo of MODIS bands 1 to 7 (645, 858, 469, 555, 1240, 1640, 2130 nm). [-]

@@ -17,6 +17,8 @@ _LAYERS = ("Time", "bottom_top", "south_north", "west_east")
 _LEVELS = ("Time", "bottom_top_stag", "south_north", "west_east")
 # Temperature of the base state, which WRF lets fall with the logarithm of pressure. [K]
 _BASE_TEMPERATURE, _BASE_LAPSE = 290.0, 50.0
+# By how much sunlit land is warmer than the air over it, in the morning. [K]
+_SUNLIT = 8.0
 
 
 def write_wrf(
@@ -54,6 +56,8 @@ def write_wrf(
         ("XLONG", _SURFACE, "degree_east", "LONGITUDE, WEST IS NEGATIVE", longitude),
         ("HGT", _SURFACE, "m", "Terrain Height", terrain),
         ("LANDMASK", _SURFACE, "", "LAND MASK (1 FOR LAND, 0 FOR WATER)", land),
+        ("TSK", _SURFACE, "K", "SURFACE SKIN TEMPERATURE", air.temperature[0] + _SUNLIT * land),
+        ("EMISS", _SURFACE, "", "SURFACE EMISSIVITY", np.where(land, 0.95, 0.98)),
         ("PSFC", _SURFACE, "Pa", "SFC PRESSURE", air.level_pressure[0]),
         ("P", _LAYERS, "Pa", "perturbation pressure", air.pressure - base_pressure),
         ("PB", _LAYERS, "Pa", "BASE STATE PRESSURE", base_pressure),

@@ -15,7 +15,8 @@ from .errors import InputError
 def output_folder(path: str | PathLike[str]) -> Iterator[Path]:
     """Yield a temporary folder, the files of which move into `path` when the block succeeds.
 
-    The temporary folder lies beside `path`, on the same file system, so that moving is renaming.
+    The temporary folder lies beside `path` (in it where there is no place beside it), on the same
+    file system, so that moving is renaming.
     Whatever ends the block early, a keyboard interrupt too, deletes it and leaves `path` as it was.
 
     Parameters
@@ -28,7 +29,8 @@ def output_folder(path: str | PathLike[str]) -> Iterator[Path]:
     existing = next(folder for folder in (target, *target.parents) if folder.exists())
     if not existing.is_dir():
         raise InputError(f"{existing} is a file where a folder is needed; give another folder.")
-    beside = existing if existing != target or os.path.ismount(target) else target.parent
+    inside = os.path.ismount(target) or not os.access(target.parent, os.W_OK)
+    beside = existing if existing != target or inside else target.parent
     try:
         temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=beside))
     except OSError as error:

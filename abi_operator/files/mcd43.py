@@ -9,8 +9,8 @@ import xarray as xr
 
 from ..bands import check_bands
 from ..surface.modis_to_abi import MODIS_TO_ABI, BandRegression
+from ..surface.ross_li import WHITE_SKY
 from .errors import InputError
-from .modis_bands import BROADBAND_STAND_IN, WHITE_SKY
 from .netcdf import FilePath, cf_attributes, load, open_netcdf, require_dims, require_variables
 
 VARIABLE_MAP = {
@@ -18,6 +18,9 @@ VARIABLE_MAP = {
     "BRDF_Albedo_Band_Mandatory_Quality_": "albedo_quality",
 }
 """Beginning of a variable's name in the file, before the MODIS band: ours."""
+
+BROADBAND_STAND_IN: dict[str, str] = {"C01": "vis", "green": "vis", "C02": "vis", "C03": "nir"}
+"""Broadband that may stand in for an ABI band where a file has no spectral bands."""
 
 _PARAMETERS, _QUALITY = VARIABLE_MAP
 _GRID = ("time", "lat", "lon")
@@ -171,9 +174,8 @@ def _choose_regressions(
         else:
             lacking += missing
             if missing and stand_in is not None and not broadband:
-                remedy = (
-                    ", or let broadband albedo stand in for C01, C02 and C03 (option broadband)"
-                )
+                in_place = ", ".join(BROADBAND_STAND_IN)
+                remedy = f", or let broadband albedo stand in for {in_place} (option broadband)"
         chosen.append(regression)
     if lacking:
         raise InputError(

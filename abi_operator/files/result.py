@@ -238,7 +238,7 @@ def _attributes(name: str, array: xr.Variable, horizontal: bool) -> dict[str, ob
     attributes |= {str(k): v for k, v in array.attrs.items() if k != "_FillValue"}
     if horizontal and name not in _POSITION:
         attributes["coordinates"] = " ".join(_POSITION)
-    if name in ("reflectance_factor", "brf"):
+    if name in ("reflectance_factor", "brf", "radiance", "brightness_temperature"):
         attributes["ancillary_variables"] = "quality_flag"
     if name == "quality_flag":
         attributes["flag_masks"] = np.array(list(QUALITY_FLAGS.values()), np.uint8)

@@ -26,7 +26,7 @@ VARIABLE_MAP = {
     "PB": "layer_pressure",  # the base state
     "PH": "height",  # perturbation of
     "PHB": "height",  # the base state's geopotential
-    "T": "temperature",  # potential temperature less 300 K
+    "T": "layer_temperature",  # potential temperature less 300 K
     "PSFC": "surface_pressure",
     "QVAPOR": "vapour_mixing_ratio",
     "QCLOUD": "cloud_mixing_ratio",
@@ -37,12 +37,46 @@ VARIABLE_MAP = {
     "QHAIL": "hail_mixing_ratio",
     "QNDROP": "cloud_number_mixing_ratio",  # NSSL schemes
     "QNCLOUD": "cloud_number_mixing_ratio",  # all others
+    "QNRAIN": "rain_number_mixing_ratio",
+    "QNICE": "ice_number_mixing_ratio",
+    "QNSNOW": "snow_number_mixing_ratio",
+    "QNGRAUPEL": "graupel_number_mixing_ratio",
+    "QNHAIL": "hail_number_mixing_ratio",
+    "RE_CLOUD": "cloud_effective_radius",
+    "RE_ICE": "ice_effective_radius",
+    "RE_SNOW": "snow_effective_radius",
+    "TSK": "surface_temperature",
+    "EMISS": "surface_emissivity",
     "XLAND": "land_mask",  # 1 land, 2 water
     "LANDMASK": "land_mask",  # 1 land, 0 water
 }
 """WRF's name of a variable: ours. Of two that are alternatives the latter is preferred."""
 
 REQUIRED = ("P", "PB", "PH", "PHB", "T", "QVAPOR", "QCLOUD", "XLAT", "XLONG")
+
+SCHEMES: dict[int, str] = {
+    1: "kessler",
+    2: "lin",
+    3: "wsm3",
+    4: "wsm5",
+    6: "wsm6",
+    7: "goddard",
+    8: "thompson",
+    9: "milbrandt",
+    10: "morrison",
+    14: "wdm5",
+    16: "wdm6",
+    17: "nssl",
+    18: "nssl",
+    22: "nssl",
+    28: "thompson",  # aware of aerosol, which adds the number of droplets
+    40: "morrison",  # likewise
+    50: "p3",
+    51: "p3",
+    52: "p3",
+    55: "ishmael",
+}
+"""MP_PHYSICS, WRF's number of a microphysics scheme: its name. (Registry.EM_COMMON of WRF)"""
 
 DIMENSIONS = {
     "bottom_top": "layer",
@@ -55,6 +89,15 @@ DIMENSIONS = {
 _THETA_OFFSET = 300.0
 # Pressure at which temperature and potential temperature agree. [Pa]
 _THETA_PRESSURE = 1.0e5
+
+# Endings of our names of variables that need no arithmetic.
+_TAKEN_AS_THEY_ARE = (
+    "mixing_ratio",
+    "effective_radius",
+    "surface_pressure",
+    "surface_temperature",
+    "surface_emissivity",
+)
 
 _ADVICE = "give a WRF output file (wrfout_*) that holds them"
 
@@ -74,9 +117,9 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
     xarray.Dataset
         Coordinates ``time``, of the whole file, and ``latitude`` and ``longitude`` (y, x)
         [degree]; ``land_mask`` if the file has one. Attributes ``title``,
-        ``microphysics_scheme`` (WRF's number), ``bottom_top_levels_of_run`` (layers of the run,
-        of which the file may hold fewer) and ``moving_nest`` (1 where positions differ from time
-        to time, else 0).
+        ``microphysics_scheme`` (a name of `SCHEMES`, or ``"MP_PHYSICS=99"`` for a number that is
+        not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
+        fewer) and ``moving_nest`` (1 where positions differ from time to time, else 0).
     """
     with open_netcdf(path) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
@@ -98,9 +141,9 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
     """Read one time and a block of rows of a WRF file; nothing else is read from disk.
 
     Pressure is P + PB, temperature (T + 300) (p / 1e5 Pa)^(2/7), with T and not the moist THM,
-    and height (PH + PHB) / 9.81. Water of each kind is per mass of dry air. Advection leaves tiny
-    negative amounts; they are set to zero, and the variable's attribute
-    ``num_negative_set_to_zero`` tells how many there were.
+    and height (PH + PHB) / 9.81. Water of each kind, and the number of its particles, is per mass
+    of dry air. Advection leaves tiny negative amounts; they are set to zero, and the variable's
+    attribute ``num_negative_set_to_zero`` tells how many there were.
 
     Parameters
     ----------
@@ -125,11 +168,11 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
         theta = _field(file, "T", **place) + _THETA_OFFSET
         fields = {
             "layer_pressure": pressure,
-            "temperature": theta * (pressure / _THETA_PRESSURE) ** KAPPA,
+            "layer_temperature": theta * (pressure / _THETA_PRESSURE) ** KAPPA,
             "height": (_field(file, "PH", **place) + _field(file, "PHB", **place)) / GRAVITY,
         }
         for name, ours in VARIABLE_MAP.items():
-            if name in file and (ours == "surface_pressure" or ours.endswith("mixing_ratio")):
+            if name in file and ours.endswith(_TAKEN_AS_THEY_ARE):
                 fields[ours] = _field(file, name, **place)
         land_mask = _land_mask(file, **place)
         if land_mask is not None:
@@ -249,7 +292,8 @@ def _attributes(file: xr.Dataset) -> dict[str, str | int]:
     if "TITLE" in file.attrs:
         attributes["title"] = str(file.attrs["TITLE"]).strip()
     if "MP_PHYSICS" in file.attrs:
-        attributes["microphysics_scheme"] = int(file.attrs["MP_PHYSICS"])
+        number = int(file.attrs["MP_PHYSICS"])
+        attributes["microphysics_scheme"] = SCHEMES.get(number, f"MP_PHYSICS={number}")
     if "BOTTOM-TOP_GRID_DIMENSION" in file.attrs:
         num_levels = int(file.attrs["BOTTOM-TOP_GRID_DIMENSION"])
         attributes["bottom_top_levels_of_run"] = num_levels - 1

@@ -25,6 +25,7 @@ from .hydrometeor import hydrometeor as hydrometeor
 from .hydrometeor import outside_fitted_range as outside_fitted_range
 from .hydrometeor import particle_radius as particle_radius
 from .mie_aerosol import mie_optics as mie_optics
+from .mie_phase import MiePhase as MiePhase
 from .mie_table import mie_species as mie_species
 from .phase import HenyeyGreenstein as HenyeyGreenstein
 from .phase import RayleighPhase as RayleighPhase

@@ -7,6 +7,7 @@ from ..atmosphere import Atmosphere, MiePlume, Plume
 from ..bands import Band
 from ..optical_properties import OpticalProperties, Scatterer
 from .mie_aerosol import mie_optics
+from .mie_phase import MiePhase
 from .phase import HenyeyGreenstein
 
 
@@ -34,14 +35,15 @@ def overlap(
 
 
 def aerosol(atmosphere: Atmosphere, plume: str, band: Band) -> OpticalProperties:
-    r"""Optical properties of one plume, with the phase function of Henyey and Greenstein.
+    r"""Optical properties of one plume.
 
     .. math:: \tau_k = b\, \beta_{550}\, r_\mathrm{band}\, h_k
 
     with brightness b, extinction coefficient :math:`\beta_{550}`, relative extinction r and the
-    length h of the layer inside the plume (`overlap`). Of a `Plume`, relative extinction,
-    single-scattering albedo and asymmetry factor are those specified; of a `MiePlume`, those of
-    its species at its effective radius (`mie_optics`).
+    length h of the layer inside the plume (`overlap`). Of a `Plume`, relative extinction and
+    single-scattering albedo are those specified, and the phase function is that of Henyey and
+    Greenstein with the asymmetry factor specified; of a `MiePlume`, all are those of its species
+    at its effective radius (`mie_optics`, `MiePhase`).
 
     Parameters
     ----------
@@ -61,14 +63,17 @@ def aerosol(atmosphere: Atmosphere, plume: str, band: Band) -> OpticalProperties
         raise ValueError(f"no plume {plume!r}; the atmosphere has {sorted(atmosphere.plumes)}.")
     properties = atmosphere.plumes[plume]
     if isinstance(properties, MiePlume):
-        spheres = mie_optics(properties.species, properties.effective_radius_um, band.name)
-        relative, ssa, asymmetry = spheres._replace(coalbedo=1 - spheres.coalbedo)
+        radius = properties.effective_radius_um
+        spheres = mie_optics(properties.species, radius, band.name)
+        relative, ssa = spheres.relative_extinction, 1 - spheres.coalbedo
+        phase = MiePhase(radius, properties.species, band.name)
     else:
         relative, ssa, asymmetry = _specified(properties, plume, band)
+        phase = HenyeyGreenstein(asymmetry)
     coefficient = properties.brightness * properties.extinction_550 * relative
     above_ground = atmosphere.height - atmosphere.height[-1]
     extinction = coefficient * overlap(above_ground, properties.base, properties.top)
-    scatterer = Scatterer(ssa * extinction, HenyeyGreenstein(asymmetry))
+    scatterer = Scatterer(ssa * extinction, phase)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 

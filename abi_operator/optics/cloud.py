@@ -1,13 +1,18 @@
 """Scattering and absorption by the droplets of liquid cloud."""
 
 import jax.numpy as jnp
+from jaxtyping import Array
 
+from .._numerics import fenced
 from ..atmosphere import Atmosphere
 from ..bands import Band
 from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
 from .anomalous_diffraction import mean_efficiencies
 from .droplets import NU, effective_radius
+from .mie_aerosol import mie_optics
+from .mie_phase import MiePhase
+from .mie_table import DROPLETS
 from .phase import HenyeyGreenstein
 from .water import REFRACTIVE_INDEX, droplet_asymmetry
 
@@ -20,9 +25,11 @@ def liquid_cloud(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
 
     .. math:: \tau = \frac{3\, m\, \bar Q_\mathrm{ext}}{4\, \rho_w\, r_\mathrm{eff}}
 
-    with efficiencies by modified anomalous diffraction (`mean_efficiencies`), and the phase
-    function of Henyey and Greenstein with the asymmetry factor of Mie theory
-    (`droplet_asymmetry`). A layer without mass or without number is empty, with derivative 0.
+    By ``optics="mitchell"`` of the cloud, efficiencies are by modified anomalous diffraction
+    (`mean_efficiencies`), and the phase function is that of Henyey and Greenstein with the
+    asymmetry factor of Mie theory (`droplet_asymmetry`); by ``"mie"`` all are Mie theory by table
+    for effective radii of 1.74-59 um (`MiePhase`). A layer without mass or without number is
+    empty, with derivative 0.
 
     Parameters
     ----------
@@ -36,12 +43,25 @@ def liquid_cloud(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
     radius = effective_radius(atmosphere.liquid)
     cloudy = radius > 0
     radius = jnp.where(cloudy, radius, radius.dtype.type(_IDLE_RADIUS))
-    q_ext, q_abs = mean_efficiencies(
-        1e6 * radius, band.wavelength_um, REFRACTIVE_INDEX[band.name], NU
-    )
+    radius_um = 1e6 * radius
+    if atmosphere.liquid.optics == "mie":
+        droplets = mie_optics(DROPLETS, radius_um, band.name)
+        q_ext = droplets.relative_extinction
+        q_abs = q_ext * droplets.coalbedo
+        phase = MiePhase(radius_um, DROPLETS, band.name)
+    else:
+        index = REFRACTIVE_INDEX[band.name]
+
+        # A kernel of its own: what mixes layers would evaluate it for each of its outputs.
+        @fenced
+        def mitchell(radius_um: Array) -> tuple[Array, Array, Array]:
+            efficiencies = mean_efficiencies(radius_um, band.wavelength_um, index, NU)
+            return *efficiencies, droplet_asymmetry(radius_um, band.name)
+
+        q_ext, q_abs, asymmetry = mitchell(radius_um)
+        phase = HenyeyGreenstein(asymmetry)
     mass = jnp.where(cloudy, atmosphere.liquid.mass_path, 0)
     cross_section = 3 * mass / (4 * WATER_DENSITY * radius)
     extinction = cross_section * q_ext
-    phase = HenyeyGreenstein(droplet_asymmetry(1e6 * radius, band.name))
     scatterer = Scatterer(extinction - cross_section * q_abs, phase)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))

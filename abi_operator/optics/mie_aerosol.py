@@ -5,8 +5,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .mie_table import mie_table
-from .water import interpolate
+from .._numerics import fenced
+from .mie_table import band_table, mie_table
+from .radius_cubics import locate, read
 
 
 class MieOptics(NamedTuple):
@@ -32,12 +33,13 @@ def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: str)
 
     Extinction is per volume of particles, :math:`\int Q\, \pi r^2\, n(r)\, dr / \int r^3\, n\, dr`,
     over the same at 550 nm, so that the optical depth at 550 nm stays what a plume says it is when
-    the radius varies. Between the radii of the table the logarithms of extinction and co-albedo and
-    the asymmetry factor are cubics in the logarithm of radius with a continuous slope. At the ends
-    of the table the slope is zero, and beyond them all is constant. Over the first and the last
-    interval the slope fades: the table is meant for what lies between, for smoke fine modes of
-    0.043-0.56 um (its coarse mode stays as it is, in fixed proportion by volume) and for ash
-    0.28-17.9 um; for any species, from the second to the last but one radius of its `mie_table`.
+    the radius varies; of ``"droplets"``, gamma distributions of water, it is the efficiency itself.
+    Between the radii of the table the logarithms of extinction and co-albedo and the asymmetry
+    factor are cubics in the logarithm of radius (`radius_cubics`). Over the first and the last
+    interval the slope fades to zero, and beyond all is constant: the table is meant for what lies
+    between, for smoke fine modes of 0.043-0.56 um (its coarse mode stays as it is, in fixed
+    proportion by volume) and for ash 0.28-17.9 um; for any species, from the second to the last but
+    one radius of its `mie_table`.
 
     Parameters
     ----------
@@ -53,16 +55,13 @@ def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: str)
     .. [1] G. Mie, "Beitraege zur Optik trueber Medien, speziell kolloidaler Metalloesungen", Ann.
        Phys., 330, 377-445, 1908, doi:10.1002/andp.19083300302
     """
-    table = mie_table(species)
-    if band not in table.asymmetry:
-        raise ValueError(
-            f"no Mie table of {species!r} in band {band!r}; choose from {list(table.asymmetry)}."
-        )
-    nodes = table.effective_radius_um
-    # Held before its logarithm is taken: optics and derivatives are finite even at a radius of 0.
-    radius = jnp.maximum(effective_radius_um, nodes[0])
-    return MieOptics(
-        jnp.exp(interpolate(radius, nodes, table.log_relative_extinction[band])),
-        jnp.exp(interpolate(radius, nodes, table.log_coalbedo[band])),
-        interpolate(radius, nodes, table.asymmetry[band]),
-    )
+    optics = band_table(species, band).efficiencies
+    nodes = mie_table(species).effective_radius_um
+
+    @fenced
+    def interpolate(radius_um: Array) -> tuple[Array, Array, Array]:
+        row, weights = locate(radius_um, nodes)
+        values = read(jnp.asarray(optics, weights.dtype), row, weights)
+        return jnp.exp(values[..., 0]), jnp.exp(values[..., 1]), values[..., 2]
+
+    return MieOptics(*interpolate(effective_radius_um))

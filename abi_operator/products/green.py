@@ -112,7 +112,8 @@ def corrected_colors(
     The two orders differ where the correction is not the same straight line in all bands, which it
     never is. The recipe of Grasso et al. (2013) was regressed on albedos of the ground, so that
     ``"correct_first"`` is what it was made for; green at the top of the atmosphere is what that
-    paper displays.
+    paper displays, and over standard grounds the nearer to 0.555 um, as what the recipe lacks over
+    plants and water and what the air adds nearly cancel (`benchmarks/paper_figures.py`).
 
     Parameters
     ----------

@@ -2,20 +2,31 @@
 
 `scenario` specifies one time of a scene: it completes the columns of a model Dataset to the top of
 the atmosphere and adds ground, sun, satellite and plumes. `column_states` makes of it, or of a
-result that is read back, the states that the operator takes. `simulate` adds the reflectances, and
-`run` does so for scenes that do not fit into memory. No file is opened here.
+result that is read back, the states that the operator takes. `simulate` adds radiances and
+reflectances, and `run` does so for scenes that do not fit into memory. No file is opened here.
 """
 
 from .account import add_accounts as add_accounts
 from .albedo import check_ground as check_ground
+from .angles import SATELLITE_LONGITUDE as SATELLITE_LONGITUDE
 from .column_air import completion_heights as completion_heights
 from .column_air import highest_top as highest_top
 from .columns import column_states as column_states
-from .liquid import DropletNumber as DropletNumber
+from .condensate import CLASSES as CLASSES
+from .condensate import check_classes as check_classes
+from .condensate import classes_present as classes_present
+from .droplet_number import DropletNumber as DropletNumber
+from .emissivity import Emissivity as Emissivity
+from .emissivity import check_emissivity as check_emissivity
+from .gases import check_gases as check_gases
+from .gases import gases_of as gases_of
+from .hydrometeors import check_microphysics as check_microphysics
 from .run import row_blocks as row_blocks
 from .run import run as run
-from .scenario import GOES_EAST as GOES_EAST
+from .scenario import check_absorption as check_absorption
 from .scenario import scenario as scenario
 from .simulate import simulate as simulate
 from .species import PlumeSpecification as PlumeSpecification
+from .species import classes_of as classes_of
 from .species import species_of as species_of
+from .standard_profile import nearest_standard_atmosphere as nearest_standard_atmosphere

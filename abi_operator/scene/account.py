@@ -5,44 +5,43 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import xarray as xr
 
-from .liquid import Condensate
+from .hydrometeors import Hydrometeors
 
 Attribute = str | int | float
 
 _TOTAL = "condensate_mass"
-_SHARES = {
-    "unsimulated_condensate_share": "unsimulated_condensate_mass",
-    "ice_as_droplets_share": "ice_as_droplets_mass",
-}
+_SHARES = {"unsimulated_condensate_share": "unsimulated_condensate_mass"}
 
 
-def condensate_account(weighed: Condensate) -> dict[str, Attribute]:
-    """Attributes that tell how much of a model's condensate is simulated as what it is.
+def condensate_account(found: Hydrometeors) -> dict[str, Attribute]:
+    """Attributes that tell which of a model's condensate is simulated, and by what assumptions.
 
     Masses are sums over columns [kg m-2], shares refer to all condensate [-].
     """
+    classes = [name for name in found.paths if name != "cloud"]
+    weighed = found.condensate
     attributes: dict[str, Attribute] = {
+        "hydrometeors": "; ".join(["cloud", *classes]),
+        "microphysics": found.scheme,
         _TOTAL: weighed.total,
-        "unsimulated_condensate_mass": sum(weighed.left_out.values()),
-        "ice_as_droplets_mass": weighed.ice_as_droplets,
+        "unsimulated_condensate_mass": sum(weighed.left_out.values(), 0.0),
     }
     if weighed.left_out:
         attributes["unsimulated_condensate"] = "; ".join(weighed.left_out)
+    attributes |= {
+        f"assumed_{name}_number_count": found.paths[name].num_assumed
+        for name in classes
+        if found.paths[name].num_assumed
+    }
     return _with_shares(attributes)
 
 
-def condensate_warnings(weighed: Condensate) -> list[str]:
+def condensate_warnings(found: Hydrometeors) -> list[str]:
     """Sentences to warn with, which are the same in all blocks of a scene that have the kinds."""
-    sentences = [
+    return [
         f"{kind} of the model is not simulated (unsimulated_condensate_share tells how much)."
-        for kind in weighed.left_out
+        for kind in found.condensate.left_out
     ]
-    if weighed.ice_as_droplets > 0:
-        sentences.append(
-            "cloud water below 0 C is ice in this model's microphysics (WSM3), but is simulated as "
-            "droplets (ice_as_droplets_share tells how much)."
-        )
-    return sentences
 
 
 def pressure_range(top_pressure: np.ndarray) -> dict[str, Attribute]:

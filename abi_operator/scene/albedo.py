@@ -6,6 +6,8 @@ import numpy as np
 import xarray as xr
 
 from ..files import InputError
+from ..radiance import THERMAL
+from .emissivity import Emissivity, check_emissivity, thermal_albedo
 
 # Further from a date of the albedo file, a scene's albedo is warned of. [day] (the length of the
 # period over which MODIS observations are inverted)
@@ -17,12 +19,14 @@ def surface_albedo(
     bands: tuple[str, ...],
     albedo: xr.Dataset | None,
     ocean_albedo: float | None,
-) -> tuple[np.ndarray, str]:
-    """Albedo by band (band, y, x), NaN where there is none [-]; and where it comes from.
+    emissivity: Emissivity | None = None,
+) -> tuple[np.ndarray, dict[str, str]]:
+    """Albedo by band (band, y, x), NaN where there is none [-]; and attributes that say whence.
 
-    The cell of the albedo file that is nearest in time and then in space; over water of the
-    model's land mask `ocean_albedo`. Without a land mask, `ocean_albedo` fills what the file
-    leaves missing in all of the bands.
+    In C07 it is 1 - `emissivity` (`thermal_albedo`). In the other bands it is that of the cell of
+    the albedo file that is nearest in time and then in space; over water of the model's land mask
+    `ocean_albedo`. Without a land mask, `ocean_albedo` fills what the file leaves missing in all of
+    the bands.
 
     Parameters
     ----------
@@ -33,15 +37,36 @@ def surface_albedo(
     albedo
         ``surface_albedo`` (band, time, lat, lon), as `files.read_mcd43a1` returns. [-]
     ocean_albedo
-        One albedo for all bands. [-]
+        One albedo for all bands but C07. [-]
+    emissivity
+        Of the ground in C07; see `thermal_albedo`.
 
     Raises
     ------
     InputError
-        Where neither albedo is given, or the file does not reach as far as the columns that need
-        it.
+        Where an albedo is missing, or the file does not reach as far as the columns that need it.
     """
-    check_ground(model, albedo, ocean_albedo)
+    solar = tuple(band for band in bands if band not in THERMAL)
+    check_ground(model, bands, albedo, ocean_albedo, emissivity)
+    attributes, found = {}, {}
+    if solar:
+        values, attributes["surface_albedo_source"] = _solar_albedo(
+            model, solar, albedo, ocean_albedo
+        )
+        found |= dict(zip(solar, values, strict=True))
+    for band in bands:
+        if band in THERMAL and emissivity is not None:
+            found[band], attributes["emissivity_source"] = thermal_albedo(model, emissivity)
+    return np.stack([found[band] for band in bands]), attributes
+
+
+def _solar_albedo(
+    model: xr.Dataset,
+    bands: tuple[str, ...],
+    albedo: xr.Dataset | None,
+    ocean_albedo: float | None,
+) -> tuple[np.ndarray, str]:
+    """Albedo in bands of sunlight alone (band, y, x), and where it comes from."""
     shape = (len(bands), model.sizes["y"], model.sizes["x"])
     values, source = np.full(shape, np.nan), []
     if albedo is not None:
@@ -58,7 +83,11 @@ def surface_albedo(
 
 
 def check_ground(
-    coordinates: xr.Dataset, albedo: xr.Dataset | None, ocean_albedo: float | None
+    coordinates: xr.Dataset,
+    bands: tuple[str, ...],
+    albedo: xr.Dataset | None,
+    ocean_albedo: float | None,
+    emissivity: Emissivity | None = None,
 ) -> None:
     """Raise `InputError` where there is no albedo, or the file's cells do not cover the scene.
 
@@ -67,11 +96,19 @@ def check_ground(
     coordinates
         ``latitude`` and ``longitude`` (y, x) [degree] and perhaps ``land_mask``, as in a model
         Dataset.
+    bands
+        Bands to be simulated.
     albedo
         As `files.read_mcd43a1` returns. [-]
     ocean_albedo
         If given, water of the land mask needs no file. [-]
+    emissivity
+        Of the ground in C07, needed there.
     """
+    if set(bands) & set(THERMAL):
+        check_emissivity(emissivity)
+    if set(bands) <= set(THERMAL):
+        return
     if albedo is None and ocean_albedo is None:
         raise InputError(
             "the ground has no albedo; name an albedo file, an albedo of the ocean, or both."

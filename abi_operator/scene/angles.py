@@ -3,11 +3,19 @@
 from typing import NamedTuple
 
 import numpy as np
-from pyorbital.astronomy import get_alt_az
+from pyorbital.astronomy import get_alt_az, sun_earth_distance_correction
 from pyorbital.orbital import get_observer_look
 
 from ..constants import SATELLITE_HEIGHT
 from ..nomenclature import GRAZING_ZENITH, QUALITY_FLAGS
+
+SATELLITE_LONGITUDE: dict[str, float] = {
+    "GOES-16": -75.2,
+    "GOES-17": -137.2,
+    "GOES-18": -137.0,
+    "GOES-19": -75.2,
+}
+"""Longitude above which each satellite stands or stood in service. [degree] (NOAA OSPO)"""
 
 
 class Angles(NamedTuple):
@@ -55,6 +63,11 @@ def find_angles(
     )
     apart = np.abs(np.degrees(azimuth) - satellite_azimuth) % 360
     return Angles(90 - np.degrees(altitude), 90 - elevation, np.minimum(apart, 360 - apart))
+
+
+def sun_distance(time: np.datetime64 | np.ndarray) -> float:
+    """Distance of the sun at a time, UTC, by pyorbital. [AU]"""
+    return float(sun_earth_distance_correction(np.asarray(time, "datetime64[ns]")))
 
 
 def angle_flags(angles: Angles) -> np.ndarray:

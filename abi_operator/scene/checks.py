@@ -8,7 +8,7 @@ import xarray as xr
 
 from ..files import InputError
 from ..nomenclature import QUALITY_FLAGS
-from .species import species_of
+from .species import classes_of, species_of
 
 _INF = float("inf")
 
@@ -21,6 +21,16 @@ _PLUME_RANGES = {
     "relative_extinction": (0.0, _INF, "0 or more"),
     "ssa": (0.0, 1.0, "0 to 1"),
     "asymmetry": (-1.0, 1.0, "-1 to 1"),
+}
+# The same of what a scenario may have.
+_OPTIONAL_RANGES = {
+    "temperature": (100.0, 500.0, "100 to 500 K"),
+    "surface_temperature": (150.0, 400.0, "150 to 400 K"),
+    "vapour": (0.0, _INF, "0 kg m-2 or more"),
+    "ozone": (0.0, _INF, "0 DU or more"),
+    "carbon_dioxide": (0.0, 1.0, "0 to 1"),
+    "methane": (0.0, 1.0, "0 to 1"),
+    "nitrous_oxide": (0.0, 1.0, "0 to 1"),
 }
 
 
@@ -65,11 +75,16 @@ def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
     yield Requirement("pressure", "larger than in the level above", _rises(pressure))
     yield Requirement("height", "finite", np.isfinite(height))
     yield Requirement("height", "smaller than in the level above", _rises(-height))
-    mass, number = scenario["liquid_mass_path"].values, scenario["liquid_number_path"].values
-    yield Requirement("liquid_mass_path", "0 kg m-2 or more", _between(mass, 0, _INF))
-    yield Requirement("liquid_number_path", "0 m-2 or more", _between(number, 0, _INF))
-    with_mass = (number > 0) | (mass == 0)
-    yield Requirement("liquid_number_path", "positive where there is mass", with_mass)
+    for name in ("liquid", *classes_of(scenario)):
+        mass, number = (scenario[f"{name}_{x}_path"].values for x in ("mass", "number"))
+        yield Requirement(f"{name}_mass_path", "0 kg m-2 or more", _between(mass, 0, _INF))
+        yield Requirement(f"{name}_number_path", "0 m-2 or more", _between(number, 0, _INF))
+        with_mass = (number > 0) | (mass == 0)
+        yield Requirement(f"{name}_number_path", "positive where there is mass", with_mass)
+    for name, (lowest, highest, allowed) in _OPTIONAL_RANGES.items():
+        if name in scenario:
+            values = scenario[name].values
+            yield Requirement(name, allowed, _between(values, lowest, highest))
     albedo = scenario["surface_albedo"].values
     missing = (scenario["quality_flag"].values & QUALITY_FLAGS["no_albedo"]) > 0
     yield Requirement("surface_albedo", "0 to 1", _between(albedo, 0, 1) | missing)

@@ -92,7 +92,7 @@ def virtual_temperature(model: xr.Dataset) -> np.ndarray:
     """Temperature at which dry air is as light as the model's moist air (layer, y, x). [K]"""
     vapour = model["vapour_mixing_ratio"].values
     moisture = (1 + vapour * (VAPOUR_GAS_CONSTANT / DRY_AIR_GAS_CONSTANT)) / (1 + vapour)
-    return model["temperature"].values * moisture
+    return model["layer_temperature"].values * moisture
 
 
 def dry_air_path(model: xr.Dataset) -> np.ndarray:
@@ -101,5 +101,5 @@ def dry_air_path(model: xr.Dataset) -> np.ndarray:
     .. math:: \rho_d\, \Delta z, \qquad \rho_d = \frac{p}{R_d T (1 + q_v R_v / R_d)}
     """
     moist = 1 + model["vapour_mixing_ratio"].values * (VAPOUR_GAS_CONSTANT / DRY_AIR_GAS_CONSTANT)
-    temperature = DRY_AIR_GAS_CONSTANT * model["temperature"].values * moist
+    temperature = DRY_AIR_GAS_CONSTANT * model["layer_temperature"].values * moist
     return model["layer_pressure"].values / temperature * -np.diff(model["height"].values, axis=0)

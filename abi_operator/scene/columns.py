@@ -6,11 +6,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..atmosphere import Atmosphere, LiquidCloud, MiePlume, Plume, State
+from ..atmosphere import Atmosphere, Gases, Hydrometeor, LiquidCloud, MiePlume, Plume, State
 from ..bands import GRASSO2013, check_bands
 from ..geometry import Geometry
 from ..nomenclature import PLUME
-from .species import species_of
+from .species import classes_of, species_of
+
+_GASES = ("vapour", "ozone")
+_MOLE_FRACTIONS = ("carbon_dioxide", "methane", "nitrous_oxide")
 
 
 def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> State:
@@ -28,9 +31,9 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     -------
     State
         NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
-        faster.
+        faster. Gases, temperatures and hydrometeors are those that the scenario has.
     """
-    bands = check_bands(bands, GRASSO2013)
+    bands = check_bands(bands, [str(band) for band in scenario["band"].values])
     reader = _Reader(scenario)
     surface_albedo = reader.by_band("surface_albedo", bands)
     angles = {
@@ -43,10 +46,34 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     plumes: dict[str, Plume | MiePlume] = {
         species: _plume(reader, species, bands) for species in species_of(scenario)
     }
+    hydrometeors = {
+        name: Hydrometeor(
+            reader.values(f"{name}_mass_path", "layer"),
+            reader.values(f"{name}_number_path", "layer"),
+        )
+        for name in classes_of(scenario)
+    }
+    gases = None
+    if set(_GASES) <= set(scenario.variables):
+        gases = Gases(
+            **{name: reader.values(name, "layer") for name in _GASES},
+            **{name: reader.values(name) for name in _MOLE_FRACTIONS},
+        )
     atmosphere = Atmosphere(
-        reader.values("pressure", "level"), reader.values("height", "level"), liquid, plumes
+        reader.values("pressure", "level"),
+        reader.values("height", "level"),
+        liquid,
+        plumes,
+        temperature=reader.optional("temperature", "level"),
+        gases=gases,
+        hydrometeors=hydrometeors,
     )
-    return State(atmosphere, surface_albedo, Geometry(**angles))
+    return State(
+        atmosphere,
+        surface_albedo,
+        Geometry(**angles),
+        surface_temperature=reader.optional("surface_temperature"),
+    )
 
 
 def horizontal(dataset: xr.Dataset) -> dict[str, int]:
@@ -73,6 +100,10 @@ class _Reader:
         missing = {d: n for d, n in self._horizontal.items() if d not in array.dims}
         array = array.expand_dims(missing).transpose(*self._horizontal, *dims)
         return array.values.reshape(-1, *array.shape[len(self._horizontal) :])
+
+    def optional(self, name: str, *dims: str) -> Any:
+        """As `values`, or None where there is no such variable."""
+        return self.values(name, *dims) if name in self._dataset else None
 
     def by_band(self, name: str, bands: tuple[str, ...]) -> dict[str, Any]:
         """A variable in each band, (column,)."""

@@ -7,18 +7,23 @@ import numpy as np
 import xarray as xr
 
 from ..bands import GRASSO2013, check_bands
+from ..files import InputError
 from ..files.netcdf import cf_attributes
-from ..nomenclature import QUALITY_FLAGS, SCENARIO
+from ..nomenclature import QUALITY_FLAGS, variable
+from ..optics import ALL_GASES
+from ..radiance import THERMAL
+from ..satellites import SATELLITES, gas_fit_covers
 from .account import condensate_account, condensate_warnings, model_attributes, pressure_range
 from .albedo import surface_albedo
-from .angles import angle_flags, find_angles
+from .angles import SATELLITE_LONGITUDE, angle_flags, find_angles
 from .checks import check_scenario
 from .column_air import complete_air, completion_heights, highest_top
-from .liquid import DropletNumber, condensate, liquid_paths
+from .droplet_number import DropletNumber
+from .emissivity import Emissivity
+from .gases import check_gases, gas_amounts, gases_attribute, level_temperature
+from .hydrometeors import Hydrometeors, hydrometeor_paths
 from .species import PlumeSpecification, plume_variables
-
-GOES_EAST = -75.2
-"""Longitude of GOES-16 and its successors in the east. [degree]"""
+from .standard_profile import StandardProfile, nearest_standard_atmosphere, standard_profile
 
 
 def scenario(
@@ -26,18 +31,26 @@ def scenario(
     *,
     albedo: xr.Dataset | None = None,
     ocean_albedo: float | None = None,
+    emissivity: Emissivity | None = None,
     plumes: Mapping[str, PlumeSpecification] | None = None,
-    satellite_longitude: float = GOES_EAST,
+    satellite: str = "GOES-16",
+    satellite_longitude: float | None = None,
     bands: Sequence[str] = GRASSO2013,
+    gases: Sequence[str] = ALL_GASES,
+    hydrometeors: Sequence[str] | None = None,
+    microphysics: str | None = None,
     droplet_number: DropletNumber | None = None,
+    standard_atmosphere: str | None = None,
     added_heights: Sequence[float] | None = None,
     rows: slice = slice(None),
 ) -> xr.Dataset:
     """Specify a scene, or a block of its rows, from a model's output.
 
-    The columns are completed to the top of the atmosphere (`complete_air`), cloud water becomes
-    paths (`liquid_paths`), the ground gets its albedo (`surface_albedo`), sun and satellite their
-    places (`find_angles`), and the plumes are added. Condensate that is not simulated is warned of.
+    The columns are completed to the top of the atmosphere (`complete_air`), condensate becomes
+    paths (`hydrometeor_paths`), the ground gets its albedo (`surface_albedo`), sun and satellite
+    their places (`find_angles`), and the plumes are added; where gases absorb or C07 is asked for,
+    so are gases (`gas_amounts`) and temperatures (`level_temperature`). Condensate that is not
+    simulated is warned of.
 
     Parameters
     ----------
@@ -46,15 +59,29 @@ def scenario(
     albedo
         Albedo of the ground as `files.read_mcd43a1` returns it. [-]
     ocean_albedo
-        Albedo of water, or of all that `albedo` lacks where the model has no land mask. [-]
+        Albedo of water, or of all that `albedo` lacks where the model has no land mask, in all
+        bands but C07. [-]
+    emissivity
+        Of the ground in C07, needed there; see `thermal_albedo`.
     plumes
         Plumes by species, in the whole scene.
-    satellite_longitude
-        Longitude of the geostationary satellite. [degree]
+    satellite, satellite_longitude
+        Name of the satellite, and where it stands if not at its `SATELLITE_LONGITUDE`. [degree]
     bands
         Bands to be simulated.
+    gases
+        Gases that absorb, of `optics.ALL_GASES`; ``()`` leaves them out.
+    hydrometeors
+        Classes of condensate to be simulated beside cloud water, of `CLASSES`; None for those that
+        this block has. The blocks of a scene need the same.
+    microphysics
+        Scheme of `abi_operator.microphysics` by which the model's condensate is understood; None
+        for the model's own.
     droplet_number
         Number of droplets where the model has none; None for `DropletNumber`'s defaults. [m-3]
+    standard_atmosphere
+        Name of the one that gives ozone, and what is above the model; None for the nearest
+        (`nearest_standard_atmosphere`). The blocks of a scene need the same.
     added_heights
         Heights of levels to add above the model's top; None for `completion_heights` of this block.
         The blocks of a scene need the same. [m]
@@ -64,63 +91,134 @@ def scenario(
     Returns
     -------
     xarray.Dataset
-        Variables of `nomenclature.SCENARIO` and of the plumes; coordinates ``band`` and ``time``.
+        Variables of `nomenclature.SCENARIO` and of the plumes and, where they are simulated, of
+        `nomenclature.OPTIONAL` and of the hydrometeors; coordinates ``band`` and ``time``.
         Attributes account for what was assumed, completed and left out (`add_accounts`).
 
     Raises
     ------
     InputError
-        Where the albedo is missing or does not cover the scene, or a value is out of its range.
+        Where albedo or emissivity is missing or does not cover the scene, a number of particles
+        cannot be assumed, the gases of a band are not known of the satellite, or a value is out of
+        its range.
     """
-    bands = check_bands(bands, GRASSO2013)
+    bands, gases = check_bands(bands), check_gases(tuple(gases))
+    check_absorption(satellite, bands, gases)
     droplet_number = droplet_number or DropletNumber()
     if added_heights is None:
         added_heights = completion_heights(highest_top(model))
     pressure, height, top_pressure = complete_air(model, tuple(added_heights))
-    liquid = liquid_paths(model, droplet_number)
-    ground, ground_source = surface_albedo(model, bands, albedo, ocean_albedo)
+    condensate = hydrometeor_paths(
+        model,
+        droplet_number,
+        classes=None if hydrometeors is None else tuple(hydrometeors),
+        microphysics=microphysics,
+    )
+    ground, ground_sources = surface_albedo(model, bands, albedo, ocean_albedo, emissivity)
     position = {name: model[name].values for name in ("latitude", "longitude")}
     time = model["time"].values
+    if satellite_longitude is None:
+        satellite_longitude = SATELLITE_LONGITUDE[satellite]
     angles = find_angles(time, **position, satellite_longitude=satellite_longitude)
     no_albedo = np.uint8(QUALITY_FLAGS["no_albedo"]) * np.isnan(ground).any(axis=0)
+    standard = standard_profile(
+        standard_atmosphere or nearest_standard_atmosphere(position["latitude"], time)
+    )
+    air_fields, air_attributes = _air(model, height, standard, bands, gases)
     fields = {
         "pressure": pressure,
         "height": height,
-        "liquid_mass_path": _below(liquid.mass, len(added_heights)),
-        "liquid_number_path": _below(liquid.number, len(added_heights)),
         "surface_albedo": ground,
         "solar_zenith_angle": angles.solar_zenith,
         "view_zenith_angle": angles.view_zenith,
         "relative_azimuth_angle": angles.relative_azimuth,
         "quality_flag": angle_flags(angles) | no_albedo,
     }
+    fields |= air_fields | _paths(condensate, len(added_heights))
     dataset = xr.Dataset(
-        {name: (SCENARIO[name].dims, field, cf_attributes(name)) for name, field in fields.items()},
-        coords={name: (SCENARIO[name].dims, x, cf_attributes(name)) for name, x in position.items()}
+        {name: (_dims(name), field, cf_attributes(name)) for name, field in fields.items()},
+        coords={name: (_dims(name), x, cf_attributes(name)) for name, x in position.items()}
         | {"band": list(bands), "time": time},
     )
     for species, specification in (plumes or {}).items():
         dataset = dataset.assign(plume_variables(species, specification, bands, rows))
     check_scenario(dataset, first_row=rows.start or 0)
-    weighed = condensate(model)
-    for sentence in condensate_warnings(weighed):
+    for sentence in condensate_warnings(condensate):
         warnings.warn(sentence, UserWarning, stacklevel=2)
     attributes = {
+        "satellite": satellite,
         "satellite_longitude": satellite_longitude,
+        "gases": gases_attribute(gases),
         "air_above_model": "US Standard Atmosphere 1976, scaled to the pressure at the model's top",
         "num_levels_above_model": len(added_heights),
-        "surface_albedo_source": ground_source,
         "assumed_droplet_number": droplet_number.describe(model),
-        "assumed_droplet_number_count": liquid.num_assumed,
+        "assumed_droplet_number_count": condensate.paths["cloud"].num_assumed,
     }
     return dataset.assign_attrs(
         model_attributes(model)
         | attributes
+        | air_attributes
+        | ground_sources
         | pressure_range(top_pressure)
-        | condensate_account(weighed)
+        | condensate_account(condensate)
     )
 
 
-def _below(layers: np.ndarray, num_added: int) -> np.ndarray:
-    """Layers of the model under as many empty ones."""
-    return np.concatenate([np.zeros((num_added, *layers.shape[1:])), layers])
+def check_absorption(satellite: str, bands: Sequence[str], gases: Sequence[str]) -> None:
+    """Raise `InputError` where absorption in a band is not known of a satellite, or it is none."""
+    if satellite not in SATELLITES:
+        raise InputError(f"satellite {satellite!r} is not known; choose from {list(SATELLITES)}.")
+    for band in bands:
+        if gases and not gas_fit_covers(satellite, band):
+            raise InputError(
+                f"the absorption by gases in {band} is not known of {satellite}; simulate without "
+                "gases, without this band, or of another satellite."
+            )
+
+
+def _air(
+    model: xr.Dataset,
+    height: np.ndarray,
+    standard: StandardProfile,
+    bands: tuple[str, ...],
+    gases: tuple[str, ...],
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """What only gases and emission need of the air and the ground, and what was assumed of it."""
+    fields, attributes = {}, {}
+    emits = bool(set(bands) & set(THERMAL))
+    if gases:
+        fields |= gas_amounts(model, height, standard)
+    if gases or emits:
+        fields["temperature"] = level_temperature(model, height, standard)
+        attributes["standard_atmosphere"] = standard.name
+    if emits and "surface_temperature" in model:
+        fields["surface_temperature"] = model["surface_temperature"].values
+        attributes["surface_temperature_source"] = "the model's"
+    elif emits:
+        fields["surface_temperature"] = fields["temperature"][-1]
+        attributes["surface_temperature_source"] = "that of the air at the ground"
+        warnings.warn(
+            "the model has no temperature of the ground (TSK in WRF's files); it is taken to be "
+            "that of the air.",
+            UserWarning,
+            stacklevel=3,
+        )
+    return fields, attributes
+
+
+def _paths(condensate: Hydrometeors, num_added: int) -> dict[str, np.ndarray]:
+    """Paths of condensate, in the layers of the model under as many empty ones as were added."""
+    fields = {}
+    for name, paths in condensate.paths.items():
+        word = "liquid" if name == "cloud" else name
+        for quantity in ("mass", "number"):
+            layers = getattr(paths, quantity)
+            nothing = np.zeros((num_added, *layers.shape[1:]))
+            fields[f"{word}_{quantity}_path"] = np.concatenate([nothing, layers])
+    return fields
+
+
+def _dims(name: str) -> tuple[str, ...]:
+    entry = variable(name)
+    assert entry is not None
+    return entry.dims

@@ -1,7 +1,8 @@
-"""From a scenario to the reflectances that the imager would see."""
+"""From a scenario to the radiances and reflectances that the imager would see."""
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -9,26 +10,38 @@ import numpy as np
 import xarray as xr
 
 from ..atmosphere import Atmosphere, State
-from ..bands import BANDS, GRASSO2013, check_bands
+from ..bands import BANDS, check_bands
+from ..files import InputError
 from ..files.netcdf import cf_attributes
 from ..nomenclature import QUALITY_FLAGS, variable
-from ..optics import aerosol, liquid_cloud, rayleigh
+from ..optics import aerosol, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
+from ..planck import brightness_temperature
+from ..radiance import THERMAL, radiance
 from ..reflectance import brf
+from ..satellites import solar_irradiance
+from .angles import sun_distance
 from .chunks import map_chunks
 from .columns import column_states, horizontal
+from .gases import check_gases, gases_attribute, gases_of
 
-# Pixels with one of these flags are not solved.
-_UNSOLVED = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
+# Pixels with one of these flags are not solved; those of a night shine in C07.
+_UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
+_UNSOLVED = _UNSEEN | QUALITY_FLAGS["night"]
 
 
 def simulate(
     scenario: xr.Dataset,
     *,
     bands: Sequence[str] | None = None,
+    gases: Sequence[str] | None = None,
     num_streams: int = 8,
     chunk_columns: int = 1024,
 ) -> xr.Dataset:
-    """Simulate the reflectances of a scenario.
+    r"""Simulate the radiances and reflectances of a scenario.
+
+    In C07 sunlight and emission are one radiance. In the other bands radiance follows from the
+    reflectance factor, :math:`L = \rho E_0 / (\pi d^2)`, with the solar irradiance of the
+    scenario's satellite and the distance of the sun at its time (1 AU where it has none).
 
     Parameters
     ----------
@@ -36,6 +49,8 @@ def simulate(
         A scenario with the dimensions y and x, or ``column`` in their place.
     bands
         Bands to simulate; None for those of the scenario.
+    gases
+        Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams
         Streams of the solver; see `solver.toa_brf`.
     chunk_columns
@@ -44,20 +59,41 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        The scenario with the variables of `nomenclature.RESULT` and optical depths of its plumes.
-        By night the reflectance factor is 0 and brf NaN; without albedo, and out of the
-        satellite's sight, both are NaN.
+        The scenario with the variables of `nomenclature.RESULT` and optical depths of its plumes
+        and hydrometeors; with C07 brightness temperature; with hydrometeors the share of optical
+        depth that is beyond the range of sizes for which optics were fitted. C07 has no reflectance
+        factor and no brf, which are NaN. By night the reflectance factor is 0 and brf NaN; without
+        albedo, and out of the satellite's sight, all is NaN.
+
+    Raises
+    ------
+    InputError
+        Where gases are asked for that the scenario does not have.
     """
     if bands is None:
         bands = tuple(str(band) for band in scenario["band"].values)
-    bands = check_bands(bands, GRASSO2013)
+    bands = check_bands(bands)
+    gases = gases_of(scenario) if gases is None else check_gases(tuple(gases))
+    if gases and "vapour" not in scenario:
+        raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
     states = column_states(scenario, bands)
     num_columns = len(states.geometry.solar_zenith)
     fields = map_chunks(
         partial(_optical_depths, bands=bands), states.atmosphere, num_columns, chunk_columns
     )
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
-    fields |= _reflectances(states, flags, bands, num_streams, chunk_columns)
+    options = {"gases": gases, "num_streams": num_streams}
+    fields |= _reflectances(states, flags, bands, options, chunk_columns)
+    satellite = str(scenario.attrs.get("satellite", "GOES-16"))
+    distance = sun_distance(scenario["time"].values) if "time" in scenario.variables else 1.0
+    light = [solar_irradiance(band, satellite) / (np.pi * distance**2) for band in bands]
+    fields["radiance"] = fields["reflectance_factor"] * np.array(light)
+    for band in set(bands) & set(THERMAL):
+        seen = _radiance(states, flags, band, satellite, distance, options, chunk_columns)
+        fields["radiance"][:, bands.index(band)] = seen
+        fields["brightness_temperature"] = np.asarray(
+            brightness_temperature(jnp.asarray(seen), band, satellite)
+        )
     shape = horizontal(scenario)
     result = scenario.sel(band=list(bands))
     for name, values in fields.items():
@@ -66,42 +102,70 @@ def simulate(
         by_column = np.moveaxis(values, 0, -1)
         array = by_column.reshape(*by_column.shape[:-1], *shape.values())
         result[name] = ((*own_dims, *shape), array, cf_attributes(name))
-    return result.assign_attrs(num_streams=num_streams)
+    return result.assign_attrs(num_streams=num_streams, gases=gases_attribute(gases))
 
 
 def _reflectances(
-    states: State, flags: np.ndarray, bands: tuple[str, ...], num_streams: int, chunk_columns: int
+    states: State, flags: np.ndarray, bands: tuple[str, ...], options: dict, chunk_columns: int
 ) -> dict[str, np.ndarray]:
     """Reflectance factor and brf (column, band) of the columns that can be solved."""
+    solar = tuple(band for band in bands if band not in THERMAL)
     solved = np.flatnonzero((flags & _UNSOLVED) == 0)
     values = np.full((len(flags), len(bands)), np.nan)
-    if solved.size:
-        values[solved] = map_chunks(
-            partial(brf, bands=bands, num_streams=num_streams),
+    if solved.size and solar:
+        index = np.array([bands.index(band) for band in solar])
+        values[np.ix_(solved, index)] = map_chunks(
+            partial(brf, bands=solar, **options),
             jax.tree.map(lambda x: x[solved], states),
             solved.size,
             chunk_columns,
         )
     factor = np.cos(states.geometry.solar_zenith)[:, None] * values
     in_sight = (flags & QUALITY_FLAGS["out_of_sight"]) == 0
-    factor[((flags & QUALITY_FLAGS["night"]) > 0) & in_sight] = 0.0
+    night = ((flags & QUALITY_FLAGS["night"]) > 0) & in_sight
+    factor[np.ix_(night, np.array([band in solar for band in bands]))] = 0.0
     return {"reflectance_factor": factor, "brf": values}
+
+
+def _radiance(
+    states: State,
+    flags: np.ndarray,
+    band: str,
+    satellite: str,
+    distance: float,
+    options: dict,
+    chunk_columns: int,
+) -> Any:
+    """Radiance in one band that emits (column), NaN where nothing can be seen."""
+    solved = np.flatnonzero((flags & _UNSEEN) == 0)
+    values = np.full(len(flags), np.nan)
+    if solved.size:
+        values[solved] = map_chunks(
+            partial(radiance, bands=(band,), satellite=satellite, sun_distance=distance, **options),
+            jax.tree.map(lambda x: x[solved], states),
+            solved.size,
+            chunk_columns,
+        )[:, 0]
+    return values
 
 
 @partial(jax.jit, static_argnames="bands")
 def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str, jax.Array]:
-    """Optical depths of air, cloud and plumes (column, band), and of plumes at 550 nm (column)."""
+    """Optical depths of all that scatters (column, band), and of plumes at 550 nm (column)."""
 
     def depths(column: Atmosphere) -> dict[str, jax.Array]:
-        producers = {"rayleigh": rayleigh, "liquid": liquid_cloud} | {
-            species: partial(_aerosol, species=species) for species in column.plumes
-        }
+        producers = {"rayleigh": rayleigh, "liquid": liquid_cloud}
+        producers |= {name: partial(_aerosol, species=name) for name in column.plumes}
+        producers |= {name: partial(_hydrometeor, name=name) for name in column.hydrometeors}
         by_band = {
             f"{name}_optical_depth": jnp.stack(
                 [producer(column, BANDS[b]).tau.sum() for b in bands]
             )
             for name, producer in producers.items()
         }
+        if column.hydrometeors:
+            outside = [outside_fitted_range(column, BANDS[b]) for b in bands]
+            by_band["outside_fitted_range"] = jnp.stack(outside)
         return by_band | {f"{name}_aod_550": p.aod_550 for name, p in column.plumes.items()}
 
     return jax.vmap(depths)(atmosphere)
@@ -109,3 +173,7 @@ def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str,
 
 def _aerosol(column, band, *, species: str):
     return aerosol(column, species, band)
+
+
+def _hydrometeor(column, band, *, name: str):
+    return hydrometeor(column, name, band)

@@ -1,4 +1,4 @@
-"""Plumes as variables of a scenario, one species after the other."""
+"""Plumes as variables of a scenario, one species after the other; which of them there are."""
 
 from typing import NamedTuple
 
@@ -12,6 +12,8 @@ from ..files.netcdf import cf_attributes
 from ..nomenclature import PLUME
 
 _HORIZONTAL_WEIGHT = "_brightness"
+_MASS = "_mass_path"
+_LIQUID = "liquid"
 
 
 class PlumeSpecification(NamedTuple):
@@ -32,10 +34,17 @@ class PlumeSpecification(NamedTuple):
 
 def species_of(dataset: xr.Dataset) -> tuple[str, ...]:
     """Names of the species whose plumes a scenario has, in alphabetical order."""
+    return _beginnings(dataset, _HORIZONTAL_WEIGHT)
+
+
+def classes_of(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Classes of hydrometeors that a scenario has beside liquid cloud, in alphabetical order."""
+    return tuple(name for name in _beginnings(dataset, _MASS) if name != _LIQUID)
+
+
+def _beginnings(dataset: xr.Dataset, ending: str) -> tuple[str, ...]:
     names = (str(name) for name in dataset.data_vars)
-    return tuple(
-        sorted(n.removesuffix(_HORIZONTAL_WEIGHT) for n in names if n.endswith(_HORIZONTAL_WEIGHT))
-    )
+    return tuple(sorted(name.removesuffix(ending) for name in names if name.endswith(ending)))
 
 
 def plume_variables(

@@ -154,7 +154,7 @@ def surface_coupling(
 @partial(jax.jit, static_argnums=1)
 def _plane_albedo(column: Column, options: Options) -> Array:
     solve = independent_columns(
-        lambda tile: plane_albedo(tile, options), tile_size(options.num_streams)
+        lambda tile: plane_albedo(tile, options), tile_size(options.num_streams, column.tau.dtype)
     )
     return solved(column, True, solve)
 
@@ -162,6 +162,7 @@ def _plane_albedo(column: Column, options: Options) -> Array:
 @partial(jax.jit, static_argnums=(1, 2))
 def _ground_response(column: Column, options: Options, multiple_views: bool) -> GroundResponse:
     solve = independent_columns(
-        lambda tile: ground_response(tile, options), tile_size(options.num_streams)
+        lambda tile: ground_response(tile, options),
+        tile_size(options.num_streams, column.tau.dtype),
     )
     return solved(column, multiple_views, solve)

@@ -3,6 +3,7 @@
 from functools import partial
 
 import jax
+import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .._batching import tile_size
@@ -159,6 +160,30 @@ def prepare(
 @partial(jax.jit, static_argnums=(1, 2))
 def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
     solve = independent_columns(
-        lambda tile: emerging(tile, options).brf, tile_size(options.num_streams)
+        lambda tile: emerging(tile, options).brf,
+        tile_size(options.num_streams, column.tau.dtype),
+        partial(_view_by_view, options=options) if multiple_views else None,
     )
     return solved(column, multiple_views, solve)
+
+
+def _view_by_view(tile: Column, options: Options) -> tuple[Array, Column]:
+    """Reflectance of every view, and its slopes, by the derivative of one view (`adjoint`).
+
+    Views share most of a value, but nothing of a gradient, whose light comes from the view.
+    """
+
+    def of_one(view: Array) -> tuple[Array, Column]:
+        def brf(tile: Column) -> Array:
+            phase = tile.phase_function
+            seen = tile._replace(
+                mu=tile.mu[view][None],
+                relative_azimuth=tile.relative_azimuth[view][None],
+                phase_function=None if phase is None else phase[:, view][:, None],
+            )
+            return emerging(seen, options).brf[0]
+
+        value, pull_back = jax.vjp(brf, tile)
+        return value, pull_back(jnp.ones_like(value))[0]
+
+    return jax.lax.map(of_one, jnp.arange(tile.mu.shape[0]))

@@ -123,5 +123,5 @@ def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
         reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf
         return reflected if emitted is None else reflected + emitted
 
-    solve = independent_columns(radiance, tile_size(options.num_streams))
+    solve = independent_columns(radiance, tile_size(options.num_streams, column.tau.dtype))
     return solved(column, multiple_views, solve)

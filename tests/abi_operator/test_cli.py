@@ -78,7 +78,7 @@ def test_a_result_is_all_that_the_operator_needs(invoke, tmp_path):
 def test_simulate_does_what_demo_does(invoke, tmp_path, inputs):
     paths = {"--albedo": inputs.albedo, "--plume": inputs.plume, "--out": tmp_path / "out"}
     options = [word for option, path in paths.items() for word in (option, path)]
-    outcome = invoke("simulate", inputs.wrf, "--ocean-albedo", 0.03, *options)
+    outcome = invoke("simulate", inputs.wrf, "--ocean-albedo", 0.03, "--gases", "none", *options)
     assert outcome.exit_code == 0, outcome.output
     invoke("demo", "--size", SIZE, "--out", tmp_path / "demo")
     with read_result(tmp_path / "out" / "result.nc") as ours:
@@ -92,7 +92,7 @@ def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
     out = tmp_path / "out"
     outcome = invoke("simulate", inputs.wrf, "--ocean-albedo", 0.03, *options, "--out", out)
     assert outcome.exit_code == 0, outcome.output
-    assert "warning: no pictures were drawn: they need C01, C02, C03." in outcome.output
+    assert "warning: no pictures were drawn: they need C01, C02, C03, or C07." in outcome.output
     assert "flagged: no_albedo" in outcome.output
     with read_result(out / "result.nc") as result:
         assert result["band"].values.tolist() == ["C01", "C06"]
@@ -100,6 +100,39 @@ def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
         assert result.attrs["satellite_longitude"] == -137.0
         land = result["quality_flag"].values == QUALITY_FLAGS["no_albedo"]
         assert (np.isnan(result["brf"].values).all(axis=1) == land).all()
+
+
+def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
+    """Of another satellite, with cloud ice in a corner and the emissivity of a surface type."""
+    with netCDF4.Dataset(inputs.wrf, "a") as file:
+        file["QICE"][0, 20, :3, :3] = 1e-5
+        file["QRAIN"][0, 2, 5:, 5:] = 1e-4
+    options = ["--albedo", inputs.albedo, "--ocean-albedo", 0.03, "--num-streams", 2]
+    options += ["--bands", "C04,C07", "--emissivity", "open shrubland", "--satellite", "GOES-18"]
+    options += ["--hydrometeors", "ice", "--microphysics", "wsm6", "--time", 0]
+    out = tmp_path / "out"
+    outcome = invoke("simulate", inputs.wrf, *options, "--out", out)
+    assert outcome.exit_code == 0, outcome.output
+    assert "warning: rain of the model is not simulated" in outcome.stderr
+    for line in (
+        "gases that absorb: O3 H2O CO2 CH4 N2O O2 N2",
+        "number of ice, assumed: as the microphysics wsm6 does",
+        "emissivity of the ground in C07: 0.89 (open shrubland) over land, 0.978 over water",
+        "temperature of the ground: the model's",
+        "not simulated (rain)",
+    ):
+        assert line in outcome.output
+    assert sorted(x.name for x in out.iterdir()) == ["C07_2007-10-23T180000.png", "result.nc"]
+    with read_result(out / "result.nc") as result:
+        assert result.attrs["satellite"] == "GOES-18"
+        assert result.attrs["hydrometeors"] == "cloud; ice"
+        ice = result["ice_optical_depth"].sel(band="C04").values[0] > 0
+        assert ice[:3, :3].all() and ice.sum() == 9
+        vapour_hides = result["brf"].sel(band="C04").values[0] < 0.1
+        assert (vapour_hides | ice).all() and vapour_hides.any()
+        temperature = result["brightness_temperature"].values
+        assert ((temperature > 270) & (temperature < 330)).all()
+        assert np.isfinite(result["radiance"]).all()
 
 
 def without(path, name):
@@ -153,11 +186,12 @@ def test_some_albedo_is_needed(invoke, tmp_path, inputs):
 
 
 def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monkeypatch):
-    def write_png(path, rgb):
+    def read_result(path):
         raise InputError("a value is wrong.")
 
-    monkeypatch.setattr(simulation, "write_png", write_png)
-    options = ["--ocean-albedo", 0.06, "--num-streams", 2]
+    monkeypatch.setattr(simulation, "read_result", read_result)
+    options = ["--plume", inputs.plume, "--plume-species", "ash"]  # programs of the test before
+    options += ["--bands", "C01, C06", "--ocean-albedo", 0.06, "--num-streams", 2]
     outcome = invoke("simulate", inputs.wrf, *options, "--out", tmp_path / "out")
     assert outcome.exit_code == 2 and outcome.stderr == "abi-operator: a value is wrong.\n"
     assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
@@ -167,7 +201,14 @@ def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monk
     ("options", "message"),
     [
         (["--num-streams", "7"], "the number of streams is even"),
-        (["--bands", "C01,C04"], "'C04'"),
+        (["--bands", "C01,C08"], "'C08'"),
+        (["--satellite", "GOES-13"], "'GOES-13'"),
+        (["--gases", "SO2"], "['SO2'] are not known"),
+        (["--hydrometeors", "sleet"], "['sleet'] are not known"),
+        (["--microphysics", "p3"], "nothing is known of microphysics 'p3'"),
+        (["--bands", "all"], "C07 needs the emissivity of the ground"),
+        (["--bands", "C04", "--satellite", "GOES-19"], "is not known of GOES-19"),
+        (["--ocean-albedo", "0.1", "--time", "1"], "has 1 times; ask for one of them"),
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
         (["--plume-species", "dust"], "'dust' is not one of"),
     ],
@@ -210,23 +251,35 @@ def finish_demo(folder: Path) -> None:
 
 @pytest.mark.real
 def test_hurricane_katrina(invoke, tmp_path):
-    """All four times of a real WRF file, the first of them at sunrise."""
+    """All four times of a real WRF file, the first of them at sunrise, in two kinds of band."""
     folder = os.environ.get("ABI_OPERATOR_SAMPLE_DATA")
     if not folder:
         pytest.skip("ABI_OPERATOR_SAMPLE_DATA names no folder of real files")
     wrf = Path(folder) / "wrf_mercator_sample.nc"
     out = tmp_path / "out"
-    options = ["--ocean-albedo", 0.06, "--num-streams", 4]
+    options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--bands", "C02,C07"]
+    options += ["--emissivity", "water"]
     outcome = invoke("simulate", wrf, *options, "--out", out)
     assert outcome.exit_code == 0, outcome.output
-    assert "warning: rain of the model is not simulated" in outcome.stderr
-    assert "cloud water below 0 C is ice in this model's microphysics (WSM3)" in outcome.stderr
-    assert len(list(out.glob("natural_color_*.png"))) == 4
+    assert "warning: the model has no temperature of the ground" in outcome.stderr
+    for name in ("rain", "ice", "snow"):
+        assert f"number of {name}, assumed: as the microphysics wsm3 does" in outcome.stdout
+    assert len(list(out.glob("C07_*.png"))) == 4
     with read_result(out / "result.nc") as result:
         grazing = (result["quality_flag"] & QUALITY_FLAGS["grazing_sun"]) > 0
         assert grazing.isel(time=0).all() and not grazing.isel(time=slice(1, None)).any()
         assert (result["solar_zenith_angle"] < 90).all()
-        assert np.isfinite(result["brf"]).all() and np.isfinite(result["reflectance_factor"]).all()
-        assert float(result["brf"].min()) > 0 and float(result["brf"].max()) < 1.3
+        red = result.sel(band="C02")
+        assert np.isfinite(red["brf"]).all() and np.isfinite(red["reflectance_factor"]).all()
+        assert float(red["brf"].min()) > 0 and float(red["brf"].max()) < 1.3
         assert (result["pressure"].isel(level=0) == 0).all()
         assert 45000 < result.attrs["smallest_model_top_pressure"] < 51400
+        assert result.attrs["standard_atmosphere"] == "tropical"
+        assert result.attrs["unsimulated_condensate_share"] == 0.0
+        # Deep cloud is cold at its top, at 500 hPa, and the clear sea is warm.
+        temperature = result["brightness_temperature"].isel(time=2)
+        snow = result["snow_optical_depth"].sel(band="C02").isel(time=2)
+        liquid = result["liquid_optical_depth"].sel(band="C02").isel(time=2)
+        deep, clear = snow > 20, (snow + liquid) < 0.01
+        assert 255 < float(temperature.where(deep).mean()) < 275
+        assert 297 < float(temperature.where(clear).mean()) < 303

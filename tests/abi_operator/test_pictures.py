@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from abi_operator.pictures import write_png
+from abi_operator.pictures import grey, write_png
 
 
 def test_small_pictures_are_enlarged_with_north_at_the_top(tmp_path):
@@ -34,3 +34,9 @@ def test_a_picture_has_three_colours(tmp_path):
     with pytest.raises(ValueError, match=r"three colours, \(y, x, 3\); got rgb.shape=\(4, 6\)"):
         write_png(tmp_path / "a.png", np.zeros((4, 6)))
     assert not list(tmp_path.iterdir())
+
+
+def test_grey_is_linear_and_the_cold_is_white():
+    shades = grey(np.array([[330.0, 320.0, 270.0, 220.0, np.nan]]), black=320.0, white=220.0)
+    assert shades.shape == (1, 5, 3)
+    np.testing.assert_array_equal(shades[0, :, 1], [0, 0, 0.5, 1, np.nan])

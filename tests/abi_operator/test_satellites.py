@@ -43,11 +43,11 @@ def test_all_satellites_see_nearly_the_same_sun(satellite, band):
 
 
 @pytest.mark.parametrize("band", BANDS)
-def test_centroids_are_those_of_the_band_table(band):
-    assert centroid_um(band) == BANDS[band].wavelength_um
+def test_centroids_are_near_those_of_the_band_table(band):
     far = {"C04": 0.0061, "C07": 0.0141}.get(band, 0.0015)
+    assert centroid_um(band) == BANDS[band].wavelength_um
     for satellite in SATELLITES:
-        assert abs(centroid_um(band, satellite) - centroid_um(band)) < far
+        assert abs(centroid_um(band, satellite) - BANDS[band].wavelength_um) < far
 
 
 def test_ceilings_are_reflectance_factors_of_one_and_a_fifth():

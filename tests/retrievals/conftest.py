@@ -60,6 +60,12 @@ def result(aod_550=(0.05, 0.3, 0.9, 2.0), ssa_shift=0.0):
 
 
 @pytest.fixture(scope="session")
+def make_scenario():
+    """Builder of a scene that is not simulated yet."""
+    return scenario
+
+
+@pytest.fixture(scope="session")
 def make_result():
     """Builder of a simulated scene."""
     return result

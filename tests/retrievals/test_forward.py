@@ -7,6 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from abi_operator import reflectance_factor
+from abi_operator.scene import column_states, gases_of, simulate
+from retrievals.forward import ForwardModel
+from retrievals.observation import observe
 from retrievals.smoke import BANDS
 from retrievals.state_vector import StateVector
 
@@ -28,6 +31,33 @@ def test_the_state_is_what_is_seen(columns, forward):
     np.testing.assert_allclose(state.atmosphere.plumes["smoke"].aod_550, 1.3, rtol=ROUNDING)
     expected = reflectance_factor(state, BANDS, num_streams=4)
     np.testing.assert_allclose(model(x, column), expected, rtol=ROUNDING)
+
+
+def test_gases_and_ice_of_the_simulation_are_those_of_the_forward_model(make_scenario):
+    """What absorbs and scatters in the truth does so in the retrieval, and nothing else."""
+    made = make_scenario((0.3, 0.9))
+    layer = made["liquid_mass_path"]
+    levels = made["pressure"]
+    ice = layer * 0
+    ice[1] = 0.01
+    gases = {name: 400e-6 for name in ("carbon_dioxide", "methane", "nitrous_oxide")}
+    made = made.assign(
+        temperature=levels * 0 + 270.0,
+        vapour=layer * 0 + 2.0,
+        ozone=layer * 0 + 40.0,
+        ice_mass_path=ice,
+        ice_number_path=ice * 1e9,
+        **gases,
+    ).assign_attrs(gases="O3")
+    simulated = simulate(made, num_streams=2, chunk_columns=6)
+    assert simulated.attrs["gases"] == "O3"
+    stacked = simulated.stack(column=("y", "x"))
+    states, truth = column_states(stacked, BANDS), stacked["smoke_aod_550"].values
+    model = ForwardModel(StateVector(), BANDS, num_streams=2, gases=gases_of(stacked))
+    value = model(model.vector.x(truth), states)
+    np.testing.assert_allclose(value, observe(stacked, BANDS).reflectance_factor, rtol=ROUNDING)
+    others = replace(model, gases=())(model.vector.x(truth), states)
+    assert (np.abs(others - value)[:, 1] > 1e-3).all()  # ozone absorbs in C02
 
 
 def test_prepared_doublings_suffice_at_the_limit(columns, forward):

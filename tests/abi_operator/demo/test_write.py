@@ -35,7 +35,7 @@ def density(model):
     """Air with its vapour and cloud water. [kg m-3]"""
     vapour = model["vapour_mixing_ratio"]
     moist = 1 + vapour * VAPOUR_GAS_CONSTANT / DRY_AIR_GAS_CONSTANT
-    dry = model["layer_pressure"] / (DRY_AIR_GAS_CONSTANT * model["temperature"] * moist)
+    dry = model["layer_pressure"] / (DRY_AIR_GAS_CONSTANT * model["layer_temperature"] * moist)
     return dry * (1 + vapour + model["cloud_mixing_ratio"])
 
 
@@ -50,7 +50,7 @@ def test_time_and_place_are_those_of_the_santa_ana_fires(inputs):
     coordinates = wrf_coordinates(inputs.wrf)
     assert inputs.wrf.name == "wrfout_d01_2007-10-23_18-00-00.nc"
     assert list(coordinates["time"].values) == [np.datetime64("2007-10-23T18:00")]
-    assert coordinates.attrs["microphysics_scheme"] == 10
+    assert coordinates.attrs["microphysics_scheme"] == "morrison"
     assert coordinates.attrs["bottom_top_levels_of_run"] == 27
     assert float(coordinates["latitude"].mean()) == pytest.approx(33.5, abs=0.02)
     assert float(coordinates["longitude"].mean()) == pytest.approx(-117.5, abs=0.02)
@@ -70,7 +70,7 @@ def test_air_reaches_from_the_ground_to_50_hpa(model):
     assert model.sizes["layer"] == 27
     assert (np.diff(model["layer_pressure"], axis=0) > 0).all()
     assert 50e2 < model["layer_pressure"][0].max() < 80e2
-    assert 195 < model["temperature"].min() < model["temperature"].max() < 310
+    assert 195 < model["layer_temperature"].min() < model["layer_temperature"].max() < 310
 
 
 def test_air_is_hydrostatic(model):
@@ -108,7 +108,7 @@ def test_clouds_are_low_over_the_sea_and_cover_a_fifth(model):
 
 
 def test_clouds_are_saturated_and_no_air_is_supersaturated(model):
-    celsius = model["temperature"] - 273.15
+    celsius = model["layer_temperature"] - 273.15
     vapour_pressure = 611.2 * np.exp(17.67 * celsius / (celsius + 243.5))
     ratio = DRY_AIR_GAS_CONSTANT / VAPOUR_GAS_CONSTANT
     saturated = ratio * vapour_pressure / (model["layer_pressure"] - vapour_pressure)

@@ -18,7 +18,7 @@ def weights(f_iso, f_vol=0, f_geo=0, shape=(2, 2, 3)):
     return np.broadcast_to(np.array([f_iso, f_vol, f_geo], np.int16), (*shape, 3)).copy()
 
 
-BANDS = {f"Band{n}": weights(100 * n, 50, 10) for n in (1, 2, 3, 6, 7)}
+BANDS = {f"Band{n}": weights(100 * n, 50, 10) for n in range(1, 8)}
 
 
 def white_sky(f_iso, f_vol=0.05, f_geo=0.01):
@@ -26,14 +26,19 @@ def white_sky(f_iso, f_vol=0.05, f_geo=0.01):
 
 
 def test_albedo_is_white_sky_in_the_bands_of_abi(write_albedo_twin):
-    dataset = read_mcd43a1(write_albedo_twin(BANDS), ["C06", "C01", "C02", "C03"])
+    names = ["C06", "C01", "C02", "C03", "green", "C04", "C05"]
+    dataset = read_mcd43a1(write_albedo_twin(BANDS), names)
     expected = {
         "C01": 1.0057 * white_sky(0.3),
         "C02": 0.983 * white_sky(0.1) + 0.0018,
         "C03": 1.003 * white_sky(0.2) + 0.0009,
+        "green": white_sky(0.4),
+        # a third of the way from 1.24 to 1.64 um
+        "C04": 0.667 * white_sky(0.5) + 0.333 * white_sky(0.6),
+        "C05": -0.045 * white_sky(0.5) + 1.043 * white_sky(0.6) - 0.0021,
         "C06": 0.897 * white_sky(0.7) + 0.0745 * white_sky(0.6) + 0.0033,
     }
-    assert list(dataset["band"].values) == ["C06", "C01", "C02", "C03"]
+    assert list(dataset["band"].values) == names
     albedo = dataset["surface_albedo"]
     assert albedo.dims == ("band", "time", "lat", "lon")
     assert albedo.dtype == np.float64
@@ -127,9 +132,10 @@ def test_no_broadband_stands_in_for_c06(write_albedo_twin):
         read_mcd43a1(path, ["C06"], broadband=True)
 
 
-def test_a_band_that_is_not_simulated_is_refused(write_albedo_twin):
-    with pytest.raises(ValueError, match="C99"):
-        read_mcd43a1(write_albedo_twin(BANDS), ["C99"])
+@pytest.mark.parametrize("band", ["C99", "C07"])
+def test_a_band_that_modis_does_not_tell_of_is_refused(write_albedo_twin, band):
+    with pytest.raises(ValueError, match=band):
+        read_mcd43a1(write_albedo_twin(BANDS), [band])
 
 
 def test_packed_weights_without_a_scale_are_refused(write_albedo_twin):

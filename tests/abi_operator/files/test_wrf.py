@@ -40,7 +40,7 @@ def test_variables_are_ours_top_first_in_si(write_wrf_twin):
     pressure = (raw["P"] + raw["PB"])[::-1]
     temperature = (raw["T"] + 300)[::-1] * (pressure / 1e5) ** (2 / 7)
     np.testing.assert_allclose(dataset["layer_pressure"], pressure, rtol=FLOAT32)
-    np.testing.assert_allclose(dataset["temperature"], temperature, rtol=FLOAT32)
+    np.testing.assert_allclose(dataset["layer_temperature"], temperature, rtol=FLOAT32)
     np.testing.assert_allclose(dataset["height"], (raw["PH"] + raw["PHB"])[::-1] / 9.81)
     np.testing.assert_array_equal(dataset["surface_pressure"], raw["PSFC"])
     np.testing.assert_array_equal(dataset["vapour_mixing_ratio"], raw["QVAPOR"][::-1])
@@ -73,7 +73,7 @@ def test_attributes_tell_of_the_run(write_wrf_twin):
     path = write_wrf_twin()
     for dataset in (read_wrf(path, 0), wrf_coordinates(path)):
         assert dataset.attrs["title"] == "OUTPUT FROM WRF V4.2 MODEL"
-        assert dataset.attrs["microphysics_scheme"] == 10
+        assert dataset.attrs["microphysics_scheme"] == "morrison"
         assert dataset.attrs["bottom_top_levels_of_run"] == 29
 
 
@@ -133,12 +133,36 @@ def test_optional_variables_are_absent_where_the_file_has_none(write_wrf_twin):
         ("QHAIL", "hail_mixing_ratio"),
         ("QNCLOUD", "cloud_number_mixing_ratio"),
         ("QNDROP", "cloud_number_mixing_ratio"),
+        ("QNRAIN", "rain_number_mixing_ratio"),
+        ("QNICE", "ice_number_mixing_ratio"),
+        ("QNSNOW", "snow_number_mixing_ratio"),
+        ("QNGRAUPEL", "graupel_number_mixing_ratio"),
+        ("QNHAIL", "hail_number_mixing_ratio"),
+        ("RE_CLOUD", "cloud_effective_radius"),
+        ("RE_ICE", "ice_effective_radius"),
+        ("RE_SNOW", "snow_effective_radius"),
     ],
 )
 def test_optional_hydrometeors_are_read(write_wrf_twin, name, ours):
     values = np.arange(2 * 4 * 3 * 2, dtype=np.float32).reshape(2, 4, 3, 2)
     dataset = read_wrf(write_wrf_twin(extra={name: (LAYERS, values)}), 0)
     np.testing.assert_array_equal(dataset[ours], values[0, ::-1])
+
+
+def test_the_ground_is_read_where_it_is_there(write_wrf_twin):
+    values = np.linspace(280, 300, 12, dtype=np.float32).reshape(2, 3, 2)
+    fields = {"TSK": (SURFACE, values), "EMISS": (SURFACE, values / 320)}
+    dataset = read_wrf(write_wrf_twin(extra=fields), 1)
+    np.testing.assert_array_equal(dataset["surface_temperature"], values[1])
+    np.testing.assert_array_equal(dataset["surface_emissivity"], (values / 320)[1])
+    assert "surface_temperature" not in read_wrf(write_wrf_twin(), 1)
+
+
+def test_a_scheme_without_a_name_keeps_its_number(write_wrf_twin):
+    path = write_wrf_twin()
+    with netCDF4.Dataset(path, "a") as file:
+        file.MP_PHYSICS = np.int32(99)
+    assert read_wrf(path, 0).attrs["microphysics_scheme"] == "MP_PHYSICS=99"
 
 
 def test_negative_mixing_ratios_are_set_to_zero_and_counted(write_wrf_twin):
@@ -232,7 +256,7 @@ def test_real_file_with_a_cut_column_and_a_moving_nest(sample_data: Path):
     coordinates = wrf_coordinates(path)
     assert coordinates.sizes["time"] == 4
     assert coordinates["time"].values[0] == np.datetime64("2005-08-28T12:00")
-    assert coordinates.attrs["microphysics_scheme"] == 3
+    assert coordinates.attrs["microphysics_scheme"] == "wsm3"
     assert coordinates.attrs["bottom_top_levels_of_run"] == 29
     assert coordinates.attrs["moving_nest"] == 1
     num_negative_rain = 0
@@ -241,6 +265,6 @@ def test_real_file_with_a_cut_column_and_a_moving_nest(sample_data: Path):
         assert dataset.sizes == {"layer": 14, "level": 15, "y": 48, "x": 48}
         assert 48e3 < dataset["layer_pressure"].min() < 54e3
         assert dataset["layer_pressure"].max() < dataset["surface_pressure"].max() < 103e3
-        assert 255 < dataset["temperature"].min() < dataset["temperature"].max() < 310
+        assert 255 < dataset["layer_temperature"].min() < dataset["layer_temperature"].max() < 310
         num_negative_rain += dataset["rain_mixing_ratio"].attrs["num_negative_set_to_zero"]
     assert num_negative_rain == 10  # counted in the file with netCDF4

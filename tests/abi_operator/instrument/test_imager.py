@@ -1,10 +1,13 @@
 """The whole instrument: its order, and at which temperature a fire saturates it."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from abi_operator import BANDS, Fire, Geometry, State, radiance, standard_atmosphere
 from abi_operator.instrument import (
     Imager,
     Observation,
@@ -17,6 +20,7 @@ from abi_operator.instrument import (
     overlap_lengths,
     range_ceiling,
 )
+from abi_operator.optics import gas_absorption, rayleigh, transmittance
 from abi_operator.planck import brightness_temperature, in_band_radiance
 
 CELLS = 25  # cells of 400 m in a pixel of 2 km
@@ -61,6 +65,61 @@ def test_radiance_is_averaged_before_it_is_limited():
 )
 def test_fire_that_saturates_one_pixel(band, imager, expected, tolerance):
     assert saturation_temperature(band, imager) == pytest.approx(expected, abs=tolerance)
+
+
+def test_air_sun_and_emissivity_move_the_limits_of_a_fire():
+    """The same fire by the operator: nothing between, then air, then sun on a ground that reflects.
+
+    By Beer's law a fire saturates where p (1 - a) t [B(T) - B(300 K)] fills what the pixel without
+    it leaves below the ceiling.
+    """
+    bands = ("C06", "C07")
+    day = Geometry(jnp.asarray(0.6), jnp.asarray(0.9), jnp.asarray(1.0))
+    night = replace(day, solar_zenith=jnp.asarray(2.0))
+    air = standard_atmosphere("midlatitude_summer", np.linspace(30e3, 0.0, 9))
+    nothing = replace(air, pressure=0 * air.pressure, gases=jax.tree.map(jnp.zeros_like, air.gases))
+    cases = [(nothing, night, 0.0), (air, night, 0.0), (air, night, 0.2), (air, day, 0.2)]
+    columns = [
+        State(a, dict.fromkeys(bands, jnp.asarray(x)), g, jnp.asarray(GROUND)) for a, g, x in cases
+    ]
+    states = jax.tree.map(lambda *x: jnp.stack(x), *columns)
+
+    @jax.jit
+    def pixel(temperature):
+        """Radiance of the burning cell and of the 24 others, (case, cell, band)."""
+        cells = [
+            replace(states, fire=Fire(jnp.full(4, share), temperature)) for share in (1.0, 0.0)
+        ]
+        both = jax.tree.map(lambda *x: jnp.stack(x, axis=1), *cells)
+        return radiance(both, bands, num_streams=2, num_doublings=2)
+
+    saturated = jax.jit(
+        jax.vmap(lambda x, band: observe(x, jnp.array([1.0, 24.0]), band).saturated, (0, None)),
+        static_argnums=1,
+    )
+    limits = {}
+    for k, band in enumerate(bands):
+        low, high = np.full(4, 400.0), np.full(4, 1500.0)
+        while np.max(high - low) > 0.01:
+            middle = (low + high) / 2
+            full = saturated(pixel(jnp.asarray(middle))[:, :, k], band)
+            low, high = np.where(full, low, middle), np.where(full, middle, high)
+        limits[band] = high
+        absorbing = [gas_absorption(a, BANDS[band]) + rayleigh(a, BANDS[band]) for a, *_ in cases]
+        clear = np.array([transmittance(x, 1 / day.mu) for x in absorbing])
+        emissivity = np.array([1 - albedo for *_, albedo in cases])
+        room = 25 * (range_ceiling(band) - pixel(jnp.asarray(high))[:, 1, k])
+        needed = in_band_radiance(jnp.asarray(GROUND), band) + room / (clear * emissivity)
+        # What air scatters is not in the transmittance; a tenth of a per cent of a radiance that
+        # goes as the seventh power of temperature or a higher one.
+        np.testing.assert_allclose(high, brightness_temperature(needed, band), atol=0.3)
+    assert limits["C07"][0] == pytest.approx(638, abs=3)
+    assert limits["C06"][0] == pytest.approx(808, abs=5)
+    for found in limits.values():
+        clear, hazy, grey, sunny = found
+        assert clear < hazy < grey and sunny < grey
+    # Sun takes a fifth of the range of C06, and a few hundredths of that of C07.
+    assert limits["C06"][2] - limits["C06"][3] > 5 * (limits["C07"][2] - limits["C07"][3]) > 0
 
 
 def test_a_whole_pixel_saturates_at_the_ceiling():

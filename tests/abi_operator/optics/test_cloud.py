@@ -22,6 +22,32 @@ def with_cloud(atmosphere, mass, number):
     return dataclasses.replace(atmosphere, liquid=liquid)
 
 
+def by_mie(atmosphere):
+    liquid = atmosphere.liquid
+    liquid = LiquidCloud(liquid.mass_path, liquid.number_path, optics="mie")
+    return dataclasses.replace(atmosphere, liquid=liquid)
+
+
+@pytest.mark.parametrize("band", BANDS)
+def test_optical_depth_by_mie_theory(make_atmosphere, droplet_mie, band):
+    atmosphere = by_mie(make_atmosphere())
+    optics = liquid_cloud(atmosphere, BANDS[band])
+    layer = 7
+    mass = atmosphere.liquid.mass_path[layer]
+    radius = effective_radius(atmosphere.liquid)[layer]
+    q_ext, q_abs, asymmetry = droplet_mie(band, 1e6 * float(radius))
+    expected = 3 * mass * q_ext / (4 * WATER_DENSITY * radius)
+    # Errors are those of the few spheres of the fixture.
+    np.testing.assert_allclose(optics.tau[0, layer], expected, rtol=1e-3)
+    np.testing.assert_allclose(1 - optics.ssa[0, layer], q_abs / q_ext, rtol=0.02, atol=1e-6)
+    np.testing.assert_allclose(optics.moments(2)[layer, 1], asymmetry, rtol=0, atol=5e-4)
+
+
+def test_unknown_optics_are_named():
+    with pytest.raises(ValueError, match="optics of LiquidCloud must be one of .* got 'fu'"):
+        LiquidCloud(jnp.zeros(2), jnp.zeros(2), optics="fu")
+
+
 @pytest.mark.parametrize("band", BANDS)
 def test_optical_depth_against_mie(make_atmosphere, droplet_mie, band):
     atmosphere = make_atmosphere()
@@ -61,18 +87,21 @@ def test_depth_is_linear_in_traces_of_mass(make_atmosphere):
 @pytest.mark.float32
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 @pytest.mark.parametrize("band", ["C06"])  # bands differ in constants alone
-def test_derivatives_are_finite_at_any_mass_and_number(make_atmosphere, mode, band):
+@pytest.mark.parametrize("kind", ["mitchell", "mie"])
+def test_derivatives_are_finite_at_any_mass_and_number(make_atmosphere, mode, band, kind):
     values = [0.0, 1e-30, 1e-18, 1e-3, 1.0, 1e10]
     mass, number = (grid.ravel() for grid in np.meshgrid(values, values))
     atmosphere = make_atmosphere(num_layers=mass.size, dtype=jnp.float32)
 
     def outputs(liquid):
         optics = liquid_cloud(dataclasses.replace(atmosphere, liquid=liquid), BANDS[band])
-        asymmetry = optics.scatterers[0].phase.moments(2)[:, 1]
+        phase = optics.scatterers[0].phase
+        shape = phase.moments(2)[:, 1], phase(jnp.asarray(-1.0, jnp.float32))
         # Layers are independent of each other, so the sum keeps every derivative apart.
-        return jnp.stack([optics.tau.sum(), optics.scattering.sum(), asymmetry.sum()])
+        return jnp.stack([x.sum() for x in (optics.tau, optics.scattering, *shape)])
 
     liquid = with_cloud(atmosphere, mass, number).liquid
+    liquid = LiquidCloud(liquid.mass_path, liquid.number_path, optics=kind)
     jacobian = jax.jit(mode(outputs))(liquid)
     assert np.all(np.isfinite(outputs(liquid)))
     assert np.all(np.isfinite(jacobian.mass_path))

@@ -1,4 +1,4 @@
-"""The file of Mie tables: what it holds, where it is from, and how it is read."""
+"""The files of Mie tables: what they hold, where they are from, and how they are read."""
 
 import re
 import subprocess
@@ -12,15 +12,18 @@ import pytest
 
 import abi_operator
 from abi_operator.bands import BANDS
-from abi_operator.optics.mie_table import mie_species, mie_table
+from abi_operator.optics.droplets import NU
+from abi_operator.optics.mie_table import FILES, band_table, mie_species, mie_table
 
-FILE = Path(str(files("abi_operator.optics") / "tables" / "aerosol_mie.nc"))
+TABLES = Path(str(files("abi_operator.optics") / "tables"))
+SPECIES = {"aerosol_mie.nc": ["smoke", "ash", "dust"], "droplet_mie.nc": ["droplets"]}
+INSIDE = slice(2, -2)  # the rows of a table without what its cubics add
 
 
-@pytest.fixture(scope="module")
-def dataset():
-    """The file, read by the netCDF library: names of species and bands, and variables."""
-    with netCDF4.Dataset(FILE) as file:
+@pytest.fixture(scope="module", params=FILES)
+def dataset(request):
+    """A file, read by the netCDF library: names of species and bands, and variables."""
+    with netCDF4.Dataset(TABLES / request.param) as file:
         file.set_auto_mask(False)
         variables = {name: variable[:] for name, variable in file.variables.items()}
         attributes = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -33,41 +36,59 @@ def dataset():
 
 def test_species_and_bands_are_those_of_the_file(dataset):
     names, variables, _ = dataset
-    assert list(mie_species()) == names["species"] == ["smoke", "ash", "dust"]
+    assert names["species"] in SPECIES.values()
+    assert list(mie_species()) == SPECIES["aerosol_mie.nc"]
     assert names["band"] == list(BANDS)
     wavelengths = [band.wavelength_um for band in BANDS.values()]
     np.testing.assert_array_equal(variables["wavelength_um"], wavelengths)
+    if names["species"] == ["droplets"]:
+        assert variables["shape"] == NU
 
 
 def test_tables_are_read_as_they_are_written(dataset):
     names, variables, _ = dataset
     for i, species in enumerate(names["species"]):
-        table = mie_table(species)
-        np.testing.assert_array_equal(
-            table.effective_radius_um, variables["effective_radius_um"][i]
-        )
+        radii = mie_table(species).effective_radius_um
+        np.testing.assert_array_equal(radii, variables["effective_radius_um"][i])
+        # `radius_cubics` takes them to be equidistant in their logarithm.
+        np.testing.assert_allclose(np.diff(np.log(radii), 2), 0, atol=1e-14)
         for j, band in enumerate(names["band"]):
-            logarithms = table.log_relative_extinction[band], table.log_coalbedo[band]
-            for values, name in zip(logarithms, ("relative_extinction", "coalbedo"), strict=True):
+            table = band_table(species, band)
+            extinction, coalbedo, asymmetry = table.efficiencies[INSIDE].T
+            for values, name in ((extinction, "extinction"), (coalbedo, "coalbedo")):
                 np.testing.assert_allclose(np.exp(values), variables[name][i, j], rtol=1e-14)
-            np.testing.assert_array_equal(table.asymmetry[band], variables["asymmetry"][i, j])
+            np.testing.assert_array_equal(asymmetry, variables["asymmetry"][i, j])
+            np.testing.assert_array_equal(table.coordinate, variables["coordinate"][i, j])
+            for name, values in (
+                ("moments", table.moments[INSIDE].T),
+                ("log_phase_function", table.log_phase[:, 0, INSIDE]),
+            ):
+                scale = variables[f"{name}_scale"][i, j].astype(float)[:, None]
+                offset = variables[f"{name}_offset"][i, j][:, None]
+                np.testing.assert_allclose(
+                    values, variables[name][i, j] * scale + offset, rtol=0, atol=scale.max()
+                )
 
 
 def test_values_are_physical(dataset):
     _, variables, _ = dataset
     assert np.all(np.diff(variables["effective_radius_um"], axis=1) > 0)
-    assert np.all(variables["relative_extinction"] > 0)
+    assert np.all(variables["extinction"] > 0)
     assert np.all((variables["coalbedo"] > 0) & (variables["coalbedo"] < 1))
+    assert np.all(np.diff(variables["coordinate"], axis=-1) > 0)
     assert np.all(np.abs(variables["asymmetry"]) < 1)
     assert np.all(variables["refractive_index_imaginary"] > 0)
 
 
-def test_the_file_is_small_and_says_where_it_is_from(dataset):
+def test_a_file_says_where_it_is_from(dataset):
     names, _, attributes = dataset
-    assert FILE.stat().st_size < 200e3
     assert "miepython" in attributes["source"]
     for species in names["species"]:
-        assert "doi:10." in attributes[f"sources_of_{species}"]
+        assert attributes[f"sources_of_{species}"]
+
+
+def test_the_files_are_small():
+    assert sum((TABLES / name).stat().st_size for name in FILES) < 600e3
 
 
 def test_a_species_by_table_alone_is_named_in_no_code():

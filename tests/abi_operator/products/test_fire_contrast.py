@@ -1,11 +1,16 @@
 """Contrast of a fire against its background."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from abi_operator import Fire, Geometry, State, radiance, standard_atmosphere
+from abi_operator.planck import in_band_radiance
 from abi_operator.products import fire_contrast, surrounding_mean
+from abi_operator.satellites import solar_irradiance
 
 ROUNDING = 1e-12
 
@@ -20,6 +25,38 @@ def test_reflectance_and_radiance_have_the_same_contrast():
     )
     slope = jax.grad(fire_contrast)(0.38, 0.15)
     np.testing.assert_allclose(slope, 1 / 0.15, rtol=ROUNDING)
+
+
+def test_contrast_in_c06_depends_on_the_albedo_of_the_background():
+    """A fire of 4 % at 600 K in grounds of five albedos, without air and under a standard one.
+
+    Without air the ground sends back mu0 E0 a / pi and the fire adds p (1 - a) [B(T_f) - B(T_s)].
+    """
+    albedo, part, hot, ground = jnp.array([0.05, 0.1, 0.2, 0.3, 0.5]), 0.04, 600.0, 300.0
+    air = standard_atmosphere("midlatitude_summer", np.linspace(30e3, 0.0, 9))
+    nothing = replace(air, pressure=0 * air.pressure, gases=jax.tree.map(jnp.zeros_like, air.gases))
+
+    def state(air, albedo, fraction):
+        geometry = Geometry(jnp.asarray(0.6), jnp.asarray(0.5), jnp.asarray(1.0))
+        fire = Fire(fraction, jnp.asarray(hot))
+        return State(air, {"C06": albedo}, geometry, jnp.asarray(ground), fire)
+
+    columns = [
+        state(x, a, jnp.asarray(p)) for x in (nothing, air) for p in (part, 0.0) for a in albedo
+    ]
+    batch = jax.tree.map(lambda *x: jnp.stack(x), *columns)
+    seen = radiance(batch, ("C06",), num_streams=2, num_doublings=2).reshape(2, 2, albedo.size)
+    clear, under_air = fire_contrast(seen[:, 0], seen[:, 1])
+
+    flames, earth = (in_band_radiance(jnp.asarray(t), "C06") for t in (hot, ground))
+    sunlit = np.cos(0.6) * solar_irradiance("C06") / np.pi * albedo
+    expected = part * (1 - albedo) * (flames - earth) / (sunlit + (1 - albedo) * earth)
+    np.testing.assert_allclose(clear, expected, rtol=1e-10)
+    # Air dims the background twice, on the way down and up, and the fire once; what it sends back
+    # itself, 1e-4, shows over the darkest ground.
+    assert (under_air > clear).all() and (np.diff(under_air) < 0).all()
+    np.testing.assert_allclose(under_air[0] / under_air[-1], clear[0] / clear[-1], rtol=0.01)
+    assert under_air[0] / under_air[-1] > 15
 
 
 def test_background_leaves_the_fire_out():

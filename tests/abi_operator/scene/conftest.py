@@ -31,7 +31,7 @@ def make_model():
             "height": (levels, height),
             "layer_pressure": (layers, SURFACE_PRESSURE * np.exp(-middle / scale_height)),
             "surface_pressure": (horizontal, SURFACE_PRESSURE * np.exp(-height[-1] / scale_height)),
-            "temperature": (layers, np.full_like(middle, TEMPERATURE)),
+            "layer_temperature": (layers, np.full_like(middle, TEMPERATURE)),
             "vapour_mixing_ratio": (layers, np.zeros_like(middle)),
             "cloud_mixing_ratio": (layers, cloud),
             "land_mask": (horizontal, (columns > 0).astype(float)),
@@ -41,12 +41,13 @@ def make_model():
             "latitude": (horizontal, 33.0 + 0.1 * rows),
             "longitude": (horizontal, -117.0 + 0.1 * columns),
         }
-        model = xr.Dataset(variables, coords, {"title": "test", "microphysics_scheme": 10})
+        model = xr.Dataset(variables, coords, {"title": "test", "microphysics_scheme": "morrison"})
         for name, value in replaced.items():
             if value is None:
                 model = model.drop_vars(name)
             else:
-                dims = layers if name.endswith(("ratio", "temperature")) else horizontal
+                layered = name.endswith(("ratio", "layer_temperature", "radius"))
+                dims = layers if layered else horizontal
                 values = np.broadcast_to(np.asarray(value, float), [model.sizes[d] for d in dims])
                 model[name] = (dims, values.copy())
         return model

@@ -1,8 +1,11 @@
 """Accounts of the blocks of a scene add up to that of the scene."""
 
+import numpy as np
+
 from abi_operator.scene import add_accounts
 from abi_operator.scene.account import condensate_account
-from abi_operator.scene.liquid import Condensate
+from abi_operator.scene.condensate import Condensate
+from abi_operator.scene.hydrometeors import Hydrometeors, Paths
 
 
 def test_blocks_add_up():
@@ -20,12 +23,18 @@ def test_blocks_add_up():
     }
 
 
-def test_shares_are_those_of_all_blocks():
-    one = condensate_account(Condensate(4.0, {"rain": 1.0}, 0.0))
-    other = condensate_account(Condensate(0.0, {}, 0.0))
-    third = condensate_account(Condensate(6.0, {"rain": 3.0, "snow": 1.0}, 2.0))
+def account(total, left_out, num_assumed=0):
+    nothing = np.zeros(1)
+    paths = {name: Paths(nothing, nothing, num_assumed) for name in ("cloud", "snow")}
+    return condensate_account(Hydrometeors(paths, Condensate(total, left_out), "wsm6"))
+
+
+def test_shares_and_assumptions_are_those_of_all_blocks():
+    one, other = account(4.0, {"rain": 1.0}, 3), account(0.0, {})
+    third = account(6.0, {"rain": 3.0, "hail": 1.0}, 2)
     assert one["unsimulated_condensate_share"] == 0.25
     scene = add_accounts([one, other, third])
     assert scene["unsimulated_condensate_share"] == 0.5
-    assert scene["ice_as_droplets_share"] == 0.2
-    assert scene["unsimulated_condensate"] == "rain; snow"
+    assert scene["unsimulated_condensate"] == "rain; hail"
+    assert scene["hydrometeors"] == "cloud; snow" and scene["microphysics"] == "wsm6"
+    assert scene["assumed_snow_number_count"] == 5

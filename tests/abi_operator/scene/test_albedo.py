@@ -14,7 +14,7 @@ def test_the_nearest_cell_is_taken(make_model, make_albedo):
     values, source = surface_albedo(make_model(), BANDS, make_albedo(), None)
     np.testing.assert_allclose(values[0], [[0.2, 0.3]] * 3)
     np.testing.assert_allclose(values[1], [[0.22, 0.32]] * 3)
-    assert source == "nearest cell of the albedo file's 2007-10-24"
+    assert source == {"surface_albedo_source": "nearest cell of the albedo file's 2007-10-24"}
 
 
 def test_the_order_of_latitudes_and_the_count_of_longitudes_do_not_matter(make_model, make_albedo):
@@ -45,7 +45,7 @@ def test_a_date_far_away_is_warned_of(make_model, make_albedo):
 def test_water_of_the_land_mask_is_ocean(make_model, make_albedo):
     values, source = surface_albedo(make_model(), BANDS, make_albedo(), 0.06)
     np.testing.assert_allclose(values[0], [[0.06, 0.3]] * 3)
-    assert source.endswith("water 0.06")
+    assert source["surface_albedo_source"].endswith("water 0.06")
 
 
 def test_land_without_inversion_stays_without_albedo(make_model, make_albedo):
@@ -90,11 +90,51 @@ def test_a_file_that_ends_within_the_scene_is_refused(make_model, make_albedo):
         r"33.10 N and -117.15 to -116.85 E"
     )
     with pytest.raises(InputError, match=message):
-        check_ground(make_model(), make_albedo(lat=(33.0, 32.8)), None)
+        check_ground(make_model(), BANDS, make_albedo(lat=(33.0, 32.8)), None)
 
 
 def test_water_with_its_own_albedo_needs_no_file(make_model, make_albedo):
     albedo = make_albedo(lon=(-116.9, -116.8))
-    check_ground(make_model(), albedo, 0.06)
+    check_ground(make_model(), BANDS, albedo, 0.06)
     with pytest.raises(InputError, match="request albedo for the whole scene"):
-        check_ground(make_model(), albedo, None)
+        check_ground(make_model(), BANDS, albedo, None)
+
+
+def test_c07_has_the_albedo_that_its_emissivity_leaves(make_model, make_albedo):
+    bands = ("C01", "C07", "C03")
+    values, sources = surface_albedo(make_model(), bands, make_albedo(), None, 0.9)
+    np.testing.assert_allclose(values[1], [[0.022, 0.1]] * 3)  # water, land
+    np.testing.assert_allclose(
+        values[[0, 2]], surface_albedo(make_model(), BANDS, make_albedo(), None)[0]
+    )
+    assert sources["emissivity_source"] == "0.9 over land, 0.978 over water"
+
+
+def test_c07_alone_needs_no_albedo(make_model):
+    model = make_model(land_mask=None)
+    check_ground(model, ("C07",), None, None, "grassland")
+    values, sources = surface_albedo(model, ("C07",), None, None, "grassland")
+    np.testing.assert_allclose(values, 0.08)
+    assert sources == {"emissivity_source": "0.92 (grassland) in all columns"}
+
+
+def test_the_models_emissivity_is_warned_of(make_model):
+    model = make_model(surface_emissivity=0.97)
+    with pytest.warns(UserWarning, match="is of the whole thermal infrared"):
+        values, sources = surface_albedo(model, ("C07",), None, None, "model")
+    np.testing.assert_allclose(values, 0.03)
+    assert sources == {"emissivity_source": "the model's broadband one"}
+
+
+@pytest.mark.parametrize(
+    ("emissivity", "message"),
+    [
+        (None, "C07 needs the emissivity of the ground: name a number, a type of surface"),
+        ("lava", "no emissivity is known of 'lava'; name a number, one of evergreen"),
+        (1.2, "the emissivity is 1.2; it must be 0 to 1"),
+        ("model", "the model has no emissivity of its own"),
+    ],
+)
+def test_an_emissivity_that_is_none_is_refused(make_model, emissivity, message):
+    with pytest.raises(InputError, match=message):
+        surface_albedo(make_model(), ("C07",), None, None, emissivity)

@@ -37,6 +37,26 @@ def test_a_state_holds_what_the_scenario_says_of_its_column(made):
     assert plume.ssa["C06"] == made["smoke_ssa"].sel(band="C06")
 
 
+def test_a_state_has_the_gases_temperatures_and_particles_of_the_scenario(make_model):
+    ice = {"ice_mixing_ratio": 1e-5, "ice_number_mixing_ratio": 1e5, "surface_temperature": 300.0}
+    options = {"ocean_albedo": 0.06, "emissivity": 0.9, "bands": ("C01", "C07")}
+    made = scenario(make_model(vapour_mixing_ratio=2e-3, **ice), **options)
+    states, column = column_states(made, ("C07",)), made.isel(y=1, x=1)
+    state = jax.tree.map(lambda leaf: leaf[3], states)
+    gases = state.atmosphere.gases
+    for name in ("vapour", "ozone", "carbon_dioxide", "methane", "nitrous_oxide"):
+        np.testing.assert_array_equal(getattr(gases, name), column[name])
+    np.testing.assert_array_equal(state.atmosphere.temperature, column["temperature"])
+    np.testing.assert_array_equal(state.surface_temperature, 300.0)
+    np.testing.assert_allclose(state.albedo["C07"], 0.1)
+    particles = state.atmosphere.hydrometeors
+    assert list(particles) == ["ice"]
+    np.testing.assert_array_equal(particles["ice"].mass_path, column["ice_mass_path"])
+    np.testing.assert_array_equal(particles["ice"].number_path, column["ice_number_path"])
+    for leaf in jax.tree.leaves(states):
+        assert isinstance(leaf, np.ndarray) and leaf.shape[0] == 6
+
+
 def test_every_leaf_has_a_leading_column_axis(made):
     for leaf in jax.tree.leaves(column_states(made)):
         assert isinstance(leaf, np.ndarray) and leaf.shape[0] == 6

@@ -5,7 +5,7 @@ import pytest
 
 from abi_operator import ash, smoke
 from abi_operator.files import InputError
-from abi_operator.nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
+from abi_operator.nomenclature import OPTIONAL, PLUME, QUALITY_FLAGS, SCENARIO, variable
 from abi_operator.scene import PlumeSpecification, scenario
 from abi_operator.scene.checks import check_scenario
 
@@ -27,7 +27,8 @@ def make_scenario(make_model):
 
 def test_a_scenario_has_the_variables_of_the_nomenclature(make_scenario):
     made = make_scenario()
-    expected = SCENARIO | {f"smoke_{name}": entry for name, entry in PLUME.items()}
+    expected = SCENARIO | {f"smoke_{name}": entry for name, entry in PLUME.items()} | OPTIONAL
+    del expected["surface_temperature"]
     assert set(made.variables) == {*expected, "band", "time"}
     for name, entry in expected.items():
         assert made[name].dims == entry.dims
@@ -63,17 +64,59 @@ def test_columns_without_albedo_are_flagged(make_scenario, make_model):
     assert (flags == QUALITY_FLAGS["no_albedo"] * np.array([[0, 1]] * 3)).all()
 
 
+def test_hydrometeors_become_paths(make_scenario, make_model):
+    ice = {"ice_mixing_ratio": 1e-5, "ice_number_mixing_ratio": 1e5}
+    made = make_scenario(make_model(land_mask=None, **ice))
+    for name in ("ice_mass_path", "ice_number_path"):
+        entry = variable(name)
+        assert made[name].dims == entry.dims and made[name].attrs["units"] == entry.units
+        assert (made[name][:8] == 0).all() and (made[name][8:] > 0).all()
+    assert made.attrs["hydrometeors"] == "cloud; ice" and made.attrs["microphysics"] == "morrison"
+    assert made.attrs["unsimulated_condensate_share"] == 0.0
+    assert "ice_mass_path" not in make_scenario()
+
+
 def test_condensate_that_is_not_simulated_is_warned_of(make_scenario, make_model):
-    model = make_model(land_mask=None, rain_mixing_ratio=1e-4).assign_attrs(microphysics_scheme=3)
-    with pytest.warns(UserWarning) as caught:
-        made = make_scenario(model)
-    assert [str(w.message).split(" (")[0] for w in caught] == [
-        "rain of the model is not simulated",
-        "cloud water below 0 C is ice in this model's microphysics",
-    ]
-    shares = made.attrs["unsimulated_condensate_share"], made.attrs["ice_as_droplets_share"]
-    assert all(0.1 < share < 0.95 for share in shares) and abs(sum(shares) - 1) < 1e-12
+    model = make_model(land_mask=None, rain_mixing_ratio=1e-4)
+    with pytest.warns(UserWarning, match="rain of the model is not simulated"):
+        made = make_scenario(model, hydrometeors=())
+    assert 0.1 < made.attrs["unsimulated_condensate_share"] < 0.95
     assert made.attrs["unsimulated_condensate"] == "rain"
+
+
+def test_only_gases_and_emission_need_temperatures(make_scenario):
+    paper = make_scenario(gases=())
+    assert set(OPTIONAL).isdisjoint(paper.variables) and paper.attrs["gases"] == "none"
+    some = make_scenario(gases=("O3", "H2O"))
+    assert set(OPTIONAL) - set(some.variables) == {"surface_temperature"}
+    assert some.attrs["gases"] == "O3 H2O"
+    assert some.attrs["standard_atmosphere"] == "midlatitude_winter"
+
+
+def test_c07_needs_the_temperature_of_the_ground(make_scenario, make_model):
+    options = {"bands": ("C01", "C07"), "emissivity": 0.9, "gases": (), "plumes": None}
+    model = make_model(land_mask=None, surface_temperature=301.0)
+    made = make_scenario(model, **options)
+    assert (made["surface_temperature"] == 301.0).all() and "vapour" not in made
+    np.testing.assert_allclose(made["surface_albedo"].sel(band="C07"), 0.1)
+    with pytest.warns(UserWarning, match="no temperature of the ground"):
+        made = make_scenario(**options)
+    np.testing.assert_array_equal(made["surface_temperature"], made["temperature"][-1])
+
+
+def test_a_satellite_stands_where_it_stands(make_scenario):
+    east, west = make_scenario(), make_scenario(satellite="GOES-18")
+    assert (west.attrs["satellite"], west.attrs["satellite_longitude"]) == ("GOES-18", -137.0)
+    assert not np.allclose(east["view_zenith_angle"], west["view_zenith_angle"], atol=1)
+    moved = make_scenario(satellite="GOES-18", satellite_longitude=-75.2)
+    np.testing.assert_array_equal(moved["view_zenith_angle"], east["view_zenith_angle"])
+
+
+def test_absorption_that_is_not_known_is_refused(make_scenario):
+    options = {"satellite": "GOES-19", "bands": ("C04",), "plumes": None}
+    with pytest.raises(InputError, match="absorption by gases in C04 is not known of GOES-19"):
+        make_scenario(**options)
+    assert make_scenario(**options, gases=()).attrs["satellite"] == "GOES-19"
 
 
 def test_plumes_of_two_species(make_scenario):
@@ -127,6 +170,13 @@ def test_plumes_must_have_the_bands(make_scenario):
         ),
         ("surface_albedo", {"band": 2}, np.nan, "surface_albedo is nan"),
         ("smoke_brightness", {}, 1.2, r"smoke_brightness is 1.2 at y=6, x=1; it must be 0 to 1"),
+        (
+            "temperature",
+            {"level": 9},
+            20.0,
+            "temperature is 20 at level=9, .* must be 100 to 500 K",
+        ),
+        ("vapour", {"layer": 11}, -1.0, "vapour is -1 at layer=11, .* 0 kg m-2 or more"),
         ("latitude", {}, np.nan, "latitude is nan at y=6, x=1; it must be finite"),
     ],
 )

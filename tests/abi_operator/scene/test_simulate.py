@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from abi_operator import brf, smoke
-from abi_operator.nomenclature import QUALITY_FLAGS, RESULT
+from abi_operator import brf, radiance, smoke
+from abi_operator.files import InputError
+from abi_operator.nomenclature import OPTIONAL_RESULT, QUALITY_FLAGS, RESULT
+from abi_operator.satellites import solar_irradiance
 from abi_operator.scene import (
     PlumeSpecification,
     column_states,
@@ -13,6 +15,7 @@ from abi_operator.scene import (
     scenario,
     simulate,
 )
+from abi_operator.scene.angles import sun_distance
 
 BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
 OPTIONS = {"num_streams": 2, "chunk_columns": 4}
@@ -88,6 +91,61 @@ def test_a_scene_by_night_is_dark(make_model):
     result = simulate(made, **OPTIONS)
     assert (result["reflectance_factor"] == 0).all() and np.isnan(result["brf"]).all()
     assert (result["rayleigh_optical_depth"] > 0.1).all()
+
+
+@pytest.fixture
+def warm(make_model):
+    """A scene with ice, rain and gases in a band of sunlight and in C07, its first row by night."""
+    particles = {"rain_mixing_ratio": 1e-4, "rain_number_mixing_ratio": 1e3}
+    particles |= {"ice_mixing_ratio": 1e-5, "ice_effective_radius": 3e-5}
+    ground = {"surface_temperature": 295.0, "land_mask": None}
+    model = make_model(vapour_mixing_ratio=4e-3, **particles, **ground)
+    options = {"ocean_albedo": 0.06, "emissivity": 0.95, "satellite": "GOES-18"}
+    made = scenario(model, bands=("C03", "C07"), **options)
+    made["solar_zenith_angle"][0] = 95.0
+    made["quality_flag"][0] = QUALITY_FLAGS["night"]
+    made["quality_flag"][2, 1] = QUALITY_FLAGS["out_of_sight"]
+    return made
+
+
+def test_c07_is_simulated_by_day_and_by_night(warm):
+    result = simulate(warm, **OPTIONS)
+    assert set(OPTIONAL_RESULT) | {"ice_optical_depth", "rain_optical_depth"} < set(
+        result.variables
+    )
+    assert np.isnan(result["reflectance_factor"].sel(band="C07")).all()
+    assert np.isnan(result["brf"].sel(band="C07")).all()
+    seen = np.isfinite(result["radiance"].sel(band="C07").values)
+    assert seen.tolist() == [[True, True], [True, True], [True, False]]
+    np.testing.assert_array_equal(np.isfinite(result["brightness_temperature"]), seen)
+    cold = result["brightness_temperature"].values[0]
+    assert ((cold > 250) & (cold < 295)).all()
+    assert (result["brightness_temperature"].values[1] > cold).all()  # the sun adds to it
+    assert (result["radiance"].sel(band="C03").values[0] == 0).all()
+
+
+def test_radiance_is_the_operators_with_the_sun_of_the_day(warm):
+    result = simulate(warm, **OPTIONS)
+    distance = sun_distance(warm["time"].values)
+    assert distance == pytest.approx(0.9947, abs=2e-4)  # 23 October, by the almanac 0.9946
+    options = {"satellite": "GOES-18", "sun_distance": distance, "num_streams": 2}
+    by_night_and_day = warm.isel(y=slice(0, 2))
+    direct = radiance(column_states(by_night_and_day, ("C03", "C07")), ("C07",), **options)
+    ours = result["radiance"].sel(band="C07").values[:2].reshape(4, 1)
+    np.testing.assert_allclose(ours, direct, rtol=ROUNDING)
+    factor = result["radiance"] / result["reflectance_factor"] * np.pi * distance**2
+    by_day = factor.sel(band="C03").values[1]
+    np.testing.assert_allclose(by_day, solar_irradiance("C03", "GOES-18"))
+
+
+def test_gases_can_be_left_out_of_the_simulation(made):
+    with_gases, without = simulate(made, **OPTIONS), simulate(made, gases=(), **OPTIONS)
+    share = (1 - with_gases["brf"] / without["brf"]).sel
+    assert (share(band="C01") > 1e-3).all()  # ozone
+    assert (np.abs(share(band="C03")) < ROUNDING).all()  # the air is dry
+    assert with_gases.attrs["gases"].split()[0] == "O3" and without.attrs["gases"] == "none"
+    with pytest.raises(InputError, match="the scenario has no gases of which H2O could absorb"):
+        simulate(made.drop_vars("vapour"), gases=("H2O",), **OPTIONS)
 
 
 def test_a_run_goes_through_all_times_and_rows(made):

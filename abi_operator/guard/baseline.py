@@ -1,0 +1,178 @@
+"""Baselines as NetCDF files: values, Jacobians, the state, and with what they were made."""
+
+import json
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import jax
+import numpy as np
+import xarray as xr
+
+from .._version import __version__
+from ..bands import BANDS
+from ..files import InputError, output_folder
+from .comparison import (
+    INPUT_TOLERANCE,
+    JACOBIAN_TOLERANCE,
+    SMALLEST_ELASTICITY,
+    SMALLEST_INPUT,
+    VALUE_TOLERANCE,
+)
+from .evaluation import UNITS, Jacobians, Request
+
+_TITLE = "Baseline of Jacobians of abi_operator"
+_ADVICE = "give a file that 'abi-operator jacobian save' wrote"
+
+
+class Baseline(NamedTuple):
+    """What a file holds.
+
+    Parameters
+    ----------
+    jacobians
+        The evaluation.
+    scenario
+        What it is of: a name, or the function that returned the states.
+    versions
+        Of abi_operator, JAX and NumPy, by name.
+    history
+        One line for each time it was written, oldest first: when, by what, why.
+    """
+
+    jacobians: Jacobians
+    scenario: str
+    versions: dict[str, str]
+    history: tuple[str, ...]
+
+
+def versions() -> dict[str, str]:
+    """Versions of what computes here."""
+    return {"abi_operator": __version__, "jax": jax.__version__, "numpy": np.__version__}
+
+
+def history_line(what: str) -> str:
+    """A line of history: now, by these versions."""
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    by = ", ".join(f"{name} {version}" for name, version in versions().items())
+    return f"{now} {what} ({by})"
+
+
+def write_baseline(path: str | PathLike[str], baseline: Baseline) -> None:
+    """Write a baseline; the file is there whole or as it was.
+
+    Versions are those of what computes here, whatever `baseline` says.
+
+    Parameters
+    ----------
+    path
+        File to write or to replace.
+    baseline
+        What to write.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written.
+    """
+    of = baseline.jacobians
+    numbers = {"zlib": True, "complevel": 9, "shuffle": True, "_FillValue": np.nan}
+    dataset = xr.Dataset(
+        {
+            "quantity": (("column", "band"), of.quantity, _QUANTITY),
+            "value": (("column", "band"), of.value, _VALUE),
+            "jacobian": (("column", "band", "input"), of.jacobian, _JACOBIAN),
+            "state": (("column", "input"), of.state, _STATE),
+            "input_units": ("input", np.array(of.units, dtype=object), _INPUT_UNITS),
+        },
+        {
+            "column": np.array(of.columns, dtype=object),
+            "band": np.array(of.bands, dtype=object),
+            "input": np.array(of.inputs, dtype=object),
+        },
+        {
+            "title": _TITLE,
+            "Conventions": "CF-1.11",
+            "scenario": baseline.scenario,
+            "dtype": "float64",
+            "settings": json.dumps(of.settings),
+            "requested_settings": json.dumps(
+                {name: of.settings[name] for name in of.request.settings}
+            ),
+            "requested_bands": json.dumps(of.request.bands),
+            "tolerances": json.dumps(_TOLERANCES),
+            "history": "\n".join(baseline.history),
+        }
+        | {f"{name}_version": version for name, version in versions().items()},
+    )
+    target = Path(path).absolute()
+    if target.is_dir():
+        raise InputError(f"{path} is a folder; give the name of a file.")
+    with output_folder(target.parent) as folder:
+        encoding = {name: numbers for name in ("value", "jacobian", "state")}
+        dataset.to_netcdf(folder / target.name, engine="netcdf4", encoding=encoding)
+
+
+def read_baseline(path: str | PathLike[str]) -> Baseline:
+    """Read a baseline.
+
+    Parameters
+    ----------
+    path
+        A file that `write_baseline` wrote.
+
+    Raises
+    ------
+    InputError
+        Where there is no such file, or it is not a baseline.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"{path} does not exist or is not a file; {_ADVICE}.")
+    try:
+        with xr.open_dataset(Path(path).absolute(), engine="netcdf4") as dataset:
+            dataset.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise InputError(f"{path} cannot be read as NetCDF ({error}); {_ADVICE}.") from error
+    try:
+        attributes = dataset.attrs
+        bands = json.loads(attributes["requested_bands"])
+        jacobians = Jacobians(
+            *(tuple(str(x) for x in dataset[name].values) for name in ("column", "band", "input")),
+            units=tuple(str(x) for x in dataset["input_units"].values),
+            quantity=dataset["quantity"].values.astype(object),
+            value=dataset["value"].values,
+            jacobian=dataset["jacobian"].values,
+            state=dataset["state"].values,
+            request=Request(
+                None if bands is None else tuple(bands),
+                json.loads(attributes["requested_settings"]),
+            ),
+            settings=json.loads(attributes["settings"]),
+        )
+        found = {name: str(attributes[f"{name}_version"]) for name in versions()}
+        history = tuple(str(attributes["history"]).splitlines())
+        scenario = str(attributes["scenario"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path} is no baseline, {error} is missing; {_ADVICE}.") from error
+    if jacobians.jacobian.dtype != np.float64 or not set(jacobians.bands) <= set(BANDS):
+        raise InputError(f"{path} holds numbers or bands that no baseline has; {_ADVICE}.")
+    return Baseline(jacobians, scenario, found, history)
+
+
+_TOLERANCES = {
+    "value": VALUE_TOLERANCE,
+    "jacobian": JACOBIAN_TOLERANCE,
+    "state": INPUT_TOLERANCE,
+    "smallest_elasticity": SMALLEST_ELASTICITY,
+    "smallest_input": SMALLEST_INPUT,
+}
+_OF_QUANTITY = ", ".join(f"{name} [{unit}]" for name, unit in UNITS.items())
+_QUANTITY = {"long_name": "operator that the band is given to", "comment": _OF_QUANTITY}
+_VALUE = {"long_name": "value of the quantity", "comment": f"units by quantity: {_OF_QUANTITY}"}
+_JACOBIAN = {
+    "long_name": "derivative of the value by the input",
+    "comment": "units: those of the quantity over input_units; NaN where there is no such input",
+}
+_STATE = {"long_name": "the inputs", "comment": "units: input_units"}
+_INPUT_UNITS = {"long_name": "units of the inputs"}

@@ -1,0 +1,96 @@
+r"""Phase functions of Mie theory, by table.
+
+The logarithm of P is interpolated in two steps, both by cubics with a continuous slope: in the
+coordinate of the scattering angle
+
+.. math:: u = \ln \frac{1 + \cos\Theta + b}{1 - \cos\Theta + f}
+
+(b, f of 1e-6), then in the logarithm of effective radius (`radius_cubics`). The coordinate is
+smooth in the cosine, with a finite derivative at exact forward and backward scattering too, and
+spends as many nodes on a degree about the glory as on a quadrant elsewhere. Moments are
+interpolated in radius alone.
+
+Between its nodes P is within 1e-3 of Mie theory for aerosols and within 4e-3 for droplets (both the
+worst of all bands, at 180 degrees; 2e-4 in C04-C07). Narrow resonances, of which sums over spheres
+catch a random share, leave that theory itself uncertain by as much for large droplets in C01-C03:
+the table smooths them. Averaged over the sphere P is 1, and its mean cosine is the first moment, to
+2e-4, in the first and the last interval of radius to 1e-3 (tests/abi_operator/optics).
+"""
+
+from functools import partial
+from typing import final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .._numerics import fenced
+from ..optical_properties import PhaseFunction
+from .mie_table import band_table, mie_table
+from .radius_cubics import locate, read
+
+
+@final
+class MiePhase(PhaseFunction):
+    """Phase function of a population of spheres, by its effective radius.
+
+    Parameters
+    ----------
+    effective_radius_um
+        Effective radius, of all layers or of each; constant beyond the table. [um]
+    material
+        Name of the table: a species of `mie_species`, or ``"droplets"``.
+    band
+        Name of the band.
+    """
+
+    effective_radius_um: Float[Array, ""] | Float[Array, " layer"]
+    material: str = eqx.field(static=True)
+    band: str = eqx.field(static=True)
+
+    def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
+        """Legendre moments.
+
+        Raises
+        ------
+        ValueError
+            Where more are asked for than the table holds.
+        """
+        held = band_table(self.material, self.band).moments.shape[1]
+        if num_moments > held:
+            raise ValueError(
+                f"the Mie table of {self.material!r} holds {held} moments, enough for {held - 1} "
+                f"streams; got {num_moments=}."
+            )
+        radius_um = jnp.atleast_1d(self.effective_radius_um)
+        return fenced(partial(_moments, self.material, self.band, num_moments))(radius_um)
+
+    def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
+        """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
+        radius_um = jnp.atleast_1d(self.effective_radius_um)
+        return fenced(partial(_phase_function, self.material, self.band))(radius_um, cos_scattering)
+
+
+# Both as kernels of their own: what mixes layers would look the table up for each of its outputs.
+def _moments(material: str, band: str, num_moments: int, radius_um: Array) -> Array:
+    table = band_table(material, band).moments[:, :num_moments]
+    row, weights = locate(radius_um, mie_table(material).effective_radius_um)
+    return read(jnp.asarray(table, weights.dtype), row, weights)
+
+
+def _phase_function(material: str, band: str, radius_um: Array, cos_scattering: Array) -> Array:
+    table = band_table(material, band)
+    row, weights = locate(radius_um, mie_table(material).effective_radius_um)
+    dtype = weights.dtype
+    backward, forward = (dtype.type(x) for x in table.offsets)
+    u = jnp.log((1 + cos_scattering + backward) / (1 - cos_scattering + forward))
+    nodes = jnp.asarray(table.coordinate, dtype)
+    k = jnp.sum(u >= nodes[1:-1], dtype=jnp.int32)
+    width = nodes[k + 1] - nodes[k]
+    x = (u - nodes[k]) / width
+    pair = jax.lax.dynamic_slice_in_dim(jnp.asarray(table.log_phase, dtype), k, 2)
+    (low, low_slope), (high, high_slope) = pair
+    bend = (1 - x) * low_slope - x * high_slope
+    by_radius = low + (high - low) * (x * x * (3 - 2 * x)) + width * x * (1 - x) * bend
+    return jnp.exp(read(by_radius, row, weights))

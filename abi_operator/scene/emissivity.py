@@ -1,0 +1,79 @@
+"""Albedo of the ground in C07, where it shines: one less its emissivity."""
+
+import warnings
+
+import numpy as np
+import xarray as xr
+
+from ..files import InputError
+from ..surface import EMISSIVITY_3900NM
+
+FROM_MODEL = "model"
+"""The emissivity to name where the model's own is meant."""
+
+Emissivity = float | str
+"""A number [-], a type of surface in `surface.EMISSIVITY_3900NM`, or `FROM_MODEL`."""
+
+
+def check_emissivity(emissivity: Emissivity | None, model: xr.Dataset | None = None) -> None:
+    """Raise `InputError` for an emissivity that is none, or that the model does not have.
+
+    Parameters
+    ----------
+    emissivity
+        What was asked for.
+    model
+        A model Dataset; None where only what was asked for is to be looked at.
+    """
+    if emissivity is None:
+        raise InputError(
+            "C07 needs the emissivity of the ground: name a number, a type of surface "
+            f"({', '.join(EMISSIVITY_3900NM)}), or {FROM_MODEL!r} for the model's own."
+        )
+    if emissivity == FROM_MODEL:
+        if model is not None and "surface_emissivity" not in model:
+            raise InputError(
+                "the model has no emissivity of its own (EMISS in WRF's files); name a number or a "
+                "type of surface."
+            )
+    elif isinstance(emissivity, str):
+        if emissivity not in EMISSIVITY_3900NM:
+            raise InputError(
+                f"no emissivity is known of {emissivity!r}; name a number, one of "
+                f"{', '.join(EMISSIVITY_3900NM)}, or {FROM_MODEL!r} for the model's own."
+            )
+    elif not 0 <= emissivity <= 1:
+        raise InputError(f"the emissivity is {emissivity:g}; it must be 0 to 1.")
+
+
+def thermal_albedo(model: xr.Dataset, emissivity: Emissivity) -> tuple[np.ndarray, str]:
+    """Albedo in C07 (y, x), 1 - emissivity [-]; and where it comes from.
+
+    MODIS has no albedo at 3.9 um. An emissivity that is a number or a type of surface is that of
+    land where the model has a land mask, and water has its own; without a mask it is that of all
+    columns. The model's emissivity is of the whole thermal infrared, which is warned of: soil and
+    sand emit less at 3.9 um.
+
+    Parameters
+    ----------
+    model
+        A model Dataset.
+    emissivity
+        What was asked for, checked.
+    """
+    check_emissivity(emissivity, model)
+    if emissivity == FROM_MODEL:
+        warnings.warn(
+            "the emissivity in C07 is the model's, which is of the whole thermal infrared.",
+            UserWarning,
+            stacklevel=2,
+        )
+        return 1 - model["surface_emissivity"].values, "the model's broadband one"
+    value = EMISSIVITY_3900NM[emissivity] if isinstance(emissivity, str) else emissivity
+    shape = model["latitude"].shape
+    name = f"{value:g}" + (f" ({emissivity})" if isinstance(emissivity, str) else "")
+    if "land_mask" not in model:
+        return np.full(shape, 1 - value), f"{name} in all columns"
+    water = EMISSIVITY_3900NM["water"]
+    land = model["land_mask"].values > 0
+    return np.where(land, 1 - value, 1 - water), f"{name} over land, {water:g} over water"

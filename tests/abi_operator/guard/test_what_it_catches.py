@@ -1,0 +1,205 @@
+"""Which standard column notices which fault: one program, with a factor for every fault.
+
+A fault is a small number in a class of particles that exists for this test alone: it travels with
+the state into the operator, where the functions that `column_optics` and the ground are read by are
+replaced by ones that look it up. So all faults are columns of one batch, and one compilation serves
+them; with all factors 0 the program is the one that is guarded, which the first test asserts.
+"""
+
+import importlib
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from guarded import BANDS, SETTINGS, two_columns
+
+from abi_operator import Hydrometeor, guard, standard_atmospheres
+from abi_operator.optical_properties import OpticalProperties, Scatterer
+from abi_operator.optics import CLASSES, mie_species
+
+COLUMN = importlib.import_module("abi_operator.optics.column")
+BAND_COLUMNS = importlib.import_module("abi_operator.band_columns")
+PROGRAM = importlib.import_module("abi_operator.solver.program")
+
+SEEN = ("C02",)
+FACTORS = "factors of faults"
+(TABLE,) = (species for species in mie_species() if species not in ("smoke", "ash"))
+SCALED = ("rayleigh", "gases", "smoke", "ash", TABLE, "liquid", "ice", "snow", "rain")
+OTHERS = ("ground", "sign of a derivative", "float32", "default of snow")
+# A scale of 1.001; a derivative's sign turned; rounding to float32; another shape of snow.
+SIZES = dict.fromkeys(SCALED, 1e-3) | {"ground": 1e-3, "default of snow": 0.1}
+SIZES |= {"sign of a derivative": 2.0, "float32": 1.0}
+
+# Those of one structure, with all the producers in it.
+EVERY = {name for name, state in guard.standard_columns().items() if state.fire is not None}
+# By day: in C02 there is nothing to see of the sun's light by night.
+DAY = EVERY - {"fire by night"}
+SMOKY = {"smoke", "smoke over stratus", "fire by day"}
+# Columns whose value moves.
+CATCHES = {
+    "rayleigh": DAY,
+    "gases": DAY,
+    "smoke": SMOKY,
+    "ash": {"ash"},
+    TABLE: {TABLE},
+    "liquid": {"liquid cloud", "smoke over stratus"},
+    "ice": {"ice, snow and rain"},
+    "snow": {"ice, snow and rain"},
+    "rain": {"ice, snow and rain"},
+    "ground": DAY,
+    "sign of a derivative": set(),
+    "float32": DAY,
+    "default of snow": {"ice, snow and rain"},
+}
+# Columns of which a derivative moves beside those: the derivative by the extinction of a plume is
+# not 0 where there is no plume, that by the mass of an empty class is.
+BY_DERIVATIVE = dict.fromkeys(("smoke", "ash", TABLE, "sign of a derivative"), DAY)
+
+
+def factors_of(atmosphere):
+    """Factors by fault, in the state that a producer is given."""
+    carrier = atmosphere.hydrometeors[FACTORS]
+    numbers = jnp.concatenate([carrier.mass_path, carrier.number_path])
+    return {name: numbers[k] for k, name in enumerate((*SCALED, *OTHERS))}
+
+
+def scaled(optics, factor):
+    scatterers = tuple(Scatterer((1 + factor) * s.scattering, s.phase) for s in optics.scatterers)
+    return OpticalProperties((1 + factor) * optics.extinction, optics.weight, scatterers)
+
+
+def rounded(x, factor):
+    """To float32 and back, with the derivative of what was not rounded."""
+    single = jax.lax.reduce_precision(x, exponent_bits=8, mantissa_bits=23)
+    return x + factor * jax.lax.stop_gradient(single - x)
+
+
+def producers():
+    """Those that `column_optics` adds up, each with its faults."""
+    rayleigh, gases, liquid = COLUMN.rayleigh, COLUMN.gas_absorption, COLUMN.liquid_cloud
+    aerosol, hydrometeor = COLUMN.aerosol, COLUMN.hydrometeor
+
+    def faulty_rayleigh(atmosphere, band):
+        factors = factors_of(atmosphere)
+        optics = scaled(rayleigh(atmosphere, band), factors["rayleigh"])
+        x = optics.extinction
+        x = x + factors["sign of a derivative"] * (jax.lax.stop_gradient(x) - x)
+        x = rounded(x, factors["float32"])
+        return OpticalProperties(x, optics.weight, optics.scatterers)
+
+    def faulty_gases(atmosphere, band, names):
+        return scaled(gases(atmosphere, band, names), factors_of(atmosphere)["gases"])
+
+    def faulty_aerosol(atmosphere, name, band):
+        return scaled(aerosol(atmosphere, name, band), factors_of(atmosphere)[name])
+
+    def faulty_liquid(atmosphere, band):
+        return scaled(liquid(atmosphere, band), factors_of(atmosphere)["liquid"])
+
+    def faulty_hydrometeor(atmosphere, name, band):
+        factors = factors_of(atmosphere)
+        if name == FACTORS:
+            nothing = jnp.zeros((1, atmosphere.height.shape[0] - 1))
+            return OpticalProperties(nothing, jnp.ones(1), ())
+        snow = CLASSES["snow"]
+        classes = CLASSES | {"snow": snow._replace(nu=snow.nu + factors["default of snow"])}
+        return scaled(hydrometeor(atmosphere, name, band, classes), factors[name])
+
+    return {
+        "rayleigh": faulty_rayleigh,
+        "gas_absorption": faulty_gases,
+        "aerosol": faulty_aerosol,
+        "liquid_cloud": faulty_liquid,
+        "hydrometeor": faulty_hydrometeor,
+    }
+
+
+def carrying(state, fault=None):
+    """The state with the factors of one fault, or none, in a class of its own."""
+    numbers = [SIZES[name] if name == fault else 0.0 for name in (*SCALED, *OTHERS)]
+    num_layers = state.atmosphere.height.shape[0] - 1
+    numbers = np.pad(numbers, (0, 2 * num_layers - len(numbers)))
+    state.atmosphere.hydrometeors[FACTORS] = Hydrometeor(
+        jnp.asarray(numbers[:num_layers]), jnp.asarray(numbers[num_layers:])
+    )
+    return state
+
+
+@pytest.fixture(scope="module")
+def evaluations():
+    """By fault, and by None without one, what the standard columns give."""
+    with pytest.MonkeyPatch.context() as patch:
+        ground_of = BAND_COLUMNS.ground_of
+
+        def faulty_ground(state, band):
+            factors = factors_of(state.atmosphere)
+            return rounded((1 + factors["ground"]) * ground_of(state, band), factors["float32"])
+
+        for name, function in producers().items():
+            patch.setattr(COLUMN, name, function)
+        patch.setattr(BAND_COLUMNS, "ground_of", faulty_ground)
+        columns = {
+            f"{name}/{fault}": carrying(state, fault)
+            for fault in (None, *CATCHES)
+            for name, state in guard.standard_columns().items()
+            if name in EVERY
+        }
+        # The class of factors makes these states a structure that no other test compiles.
+        every = guard.evaluate(columns, SEEN)
+    inputs = [name for name in every.inputs if FACTORS not in name]
+    found = {}
+    for fault in (None, *CATCHES):
+        names = tuple(name for name in guard.standard_columns() if name in EVERY)
+        part = guard.select(every, [f"{name}/{fault}" for name in names], SEEN, inputs)
+        found[fault] = part._replace(columns=names)
+    return found
+
+
+def test_without_fault_nothing_moves(evaluations, baseline):
+    """Also: the baseline in the repository is that of the code."""
+    now = evaluations[None]
+    stored = guard.select(baseline, now.columns, SEEN, now.inputs)
+    comparison = guard.compare(stored, now)
+    assert not comparison.moved, guard.report(comparison)
+    print(f"largest change, in tolerances: {guard.excess(stored, now):.1e}")
+
+
+@pytest.mark.parametrize("fault", CATCHES)
+def test_columns_that_catch(evaluations, fault):
+    """Every fault, by the columns that hold what is at fault, and no value of any other."""
+    comparison = guard.compare(evaluations[None], evaluations[fault])
+    caught = {entry.column for entry in comparison.moved}
+    by_value = {entry.column for entry in comparison.moved if not entry.entry}
+    rows = "\n".join(
+        f"{fault}: {name}, {sum(m.column == name for m in comparison.moved)} numbers, "
+        f"{max(m.excess for m in comparison.moved if m.column == name):.1e} tolerances at most"
+        for name in sorted(caught)
+    )
+    print(rows)
+    print("by value:", ", ".join(sorted(by_value)))
+    assert by_value == CATCHES[fault], rows
+    assert caught == CATCHES[fault] | BY_DERIVATIVE.get(fault, set()), rows
+
+
+def test_a_scaled_solver(monkeypatch):
+    """All light 1.001 times too bright, in the two columns that are solved at once."""
+    stored = guard.evaluate(two_columns(), BANDS, **SETTINGS)
+    brf = PROGRAM._brf
+    monkeypatch.setattr(PROGRAM, "_brf", lambda *x: 1.001 * brf(*x))
+    # A number of doublings of its own, more than enough, so that no other test gets this program.
+    now = guard.evaluate(two_columns(), BANDS, num_doublings=11, **SETTINGS)
+    caught = guard.compare(stored, now).moved
+    assert {entry.column for entry in caught} == {"dark", "bright"}
+    assert {entry.entry for entry in caught} >= {"", "albedo.C02", "geometry.view_zenith"}
+
+
+def test_a_changed_default_of_a_builder(monkeypatch):
+    """Of the standard atmospheres: every column has another state, which needs no solving."""
+    builder = standard_atmospheres.standard_atmosphere
+    before = guard.standard_columns()
+    monkeypatch.setitem(builder.__kwdefaults__, "carbon_dioxide", 420e-6)
+    after = guard.standard_columns()
+    for name in EVERY:
+        old, new = before[name].atmosphere.gases, after[name].atmosphere.gases
+        assert abs(new.carbon_dioxide / old.carbon_dioxide - 1) > guard.INPUT_TOLERANCE

@@ -1,0 +1,97 @@
+"""Grounds other than Lambertian in a state, against the solver called by hand."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from abi_operator import BANDS, Geometry, State, brf, radiance, standard_atmosphere
+from abi_operator.optics import column_optics
+from abi_operator.planck import in_band_radiance
+from abi_operator.solver import cos_scattering_angle, toa_brf, toa_radiance
+from abi_operator.surface import Lambertian, RossLi, directional_albedo, ocean, surface_emission
+
+SEEN = ("C01", "C02", "C03", "C06")
+OPTIONS = {"num_streams": 4, "num_doublings": 4}
+LEVELS = np.linspace(20e3, 0.0, 5)
+
+
+def make_state():
+    """Air over land in C02, sea in C01 and C07, and Lambertian grounds given in both ways."""
+    air = standard_atmosphere("us_standard", LEVELS)
+    wind = jnp.asarray(6.0)
+    grounds = {
+        "C01": ocean(wind, "C01"),
+        "C02": RossLi(*map(jnp.asarray, (0.2, 0.1, 0.03))),
+        "C03": 0.3,
+        "C06": Lambertian(jnp.asarray(0.25)),
+        "C07": ocean(wind, "C07"),
+    }
+    geometry = Geometry(jnp.asarray(0.5), jnp.asarray(0.6), jnp.asarray(2.5))
+    return State(air, grounds, geometry, surface_temperature=jnp.asarray(290.0))
+
+
+def by_hand(state, band, **emission):
+    """Reflectance, or radiance where emission is given, from the solver's own doors."""
+    geometry = state.geometry
+    optics = column_optics(state.atmosphere, BANDS[band])
+    angles = geometry.mu0, geometry.mu, geometry.relative_azimuth
+    ground = state.albedo[band]
+    arguments = (optics.ssa, optics.moments(5), ground, *angles)
+    phase_function = optics.phase_function(cos_scattering_angle(*angles))
+    door = toa_radiance if emission else toa_brf
+    terms = door(optics.tau, *arguments, phase_function=phase_function, **emission, **OPTIONS)
+    return jnp.sum(optics.weight * terms)
+
+
+def test_equals_the_solver_called_by_hand():
+    state = make_state()
+    found = brf(state, SEEN, **OPTIONS)
+    expected = [by_hand(state, band) for band in SEEN]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_sea_shines_by_what_it_does_not_reflect():
+    state = make_state()
+    sea = state.albedo["C07"]
+    mu, weight = np.polynomial.legendre.leggauss(48)
+    mu = jnp.asarray((1 + mu) / 2)
+    albedo = jnp.sum(jnp.asarray(weight) * mu * directional_albedo(sea, mu))
+    # The means of 16 directions and of 48.
+    np.testing.assert_allclose(sea.white_sky_albedo(), albedo, rtol=1e-7)
+    ground = surface_emission(albedo, in_band_radiance(jnp.asarray(290.0), "C07"))
+    levels = in_band_radiance(state.atmosphere.temperature, "C07")
+    expected = by_hand(
+        state, "C07", solar_irradiance=9.69, planck_levels=levels, surface_emission=ground
+    )
+    np.testing.assert_allclose(radiance(state, ("C07",), **OPTIONS)[0], expected, rtol=1e-7)
+
+
+def test_derivatives_to_weights_and_wind():
+    state = make_state()
+
+    @jax.jit
+    def of(wind, f_vol, f_geo):
+        changed = eqx.tree_at(
+            lambda s: (s.albedo["C01"].wind_speed, s.albedo["C02"].f_vol, s.albedo["C02"].f_geo),
+            state,
+            (wind, f_vol, f_geo),
+        )
+        return brf(changed, ("C01", "C02"), **OPTIONS)
+
+    point, step = [jnp.asarray(x) for x in (6.0, 0.1, 0.03)], 1e-4
+    slopes = np.stack(jax.jit(jax.jacrev(of, argnums=(0, 1, 2)))(*point))
+    for k in range(3):
+        plus, minus = ([x + s * step * (i == k) for i, x in enumerate(point)] for s in (1, -1))
+        difference = (of(*plus) - of(*minus)) / (2 * step)
+        np.testing.assert_allclose(slopes[k], difference, rtol=1e-6, atol=1e-10)
+    assert slopes[0, 1] == slopes[1, 0] == slopes[2, 0] == 0  # each band has a ground of its own
+
+
+def test_batches_repeat_what_is_one_number():
+    states = [make_state(), make_state()]
+    batch = jax.tree.map(lambda *x: jnp.stack([jnp.asarray(y) for y in x]), *states)
+    batch = eqx.tree_at(lambda s: s.albedo["C02"].f_geo, batch, jnp.asarray(0.03))
+    together = brf(batch, SEEN, **OPTIONS)
+    alone = brf(make_state(), SEEN, **OPTIONS)
+    np.testing.assert_allclose(together, [alone, alone], rtol=1e-12)

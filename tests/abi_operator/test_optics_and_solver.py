@@ -1,0 +1,80 @@
+"""Optics and solver in one program: tiles, doublings by what can be read, second derivatives."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from states import column
+
+from abi_operator import brf, optics_and_solver
+
+BANDS = ("C01",)
+OPTIONS = {"num_streams": 2, "num_modes": 1}
+
+
+def columns(count=20):
+    """Columns of two layers whose smoke and ground differ."""
+    state = column(num_layers=2)
+    state = jax.tree.map(lambda x: np.stack([np.asarray(x, float)] * count), state)
+    vary = np.linspace(0.1, 1.0, count)
+    chosen = lambda s: (s.atmosphere.plumes["smoke"].brightness, s.albedo["C01"])  # noqa: E731
+    return eqx.tree_at(chosen, state, (vary, 0.5 * vary[::-1]))
+
+
+def test_tiles_do_not_show(monkeypatch):
+    """Values and slopes of 20 columns in three tiles are those of one."""
+    state = columns()
+
+    def solved():
+        def total(state):
+            values = brf(state, BANDS, num_doublings=3, **OPTIONS)
+            return jnp.sum(values), values
+
+        return jax.grad(total, has_aux=True)(state)
+
+    whole = solved()
+    monkeypatch.setattr(optics_and_solver, "tile_size", lambda _: 1)
+    jax.clear_caches()
+    for a, b in zip(jax.tree.leaves(solved()), jax.tree.leaves(whole), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-18)
+    jax.clear_caches()
+
+
+def test_doublings_are_enough_or_the_column_is_not_a_number():
+    """A layer of 1800 is exact where it can be read, as `jax.vmap` can, and NaN where it cannot."""
+    state = columns(2)
+    mass, number = (np.array(x) for x in jax.tree.leaves(state.atmosphere.liquid))
+    mass[1, 1], number[1, 1] = 8.0, 1e13
+    cloud = lambda s: (s.atmosphere.liquid.mass_path, s.atmosphere.liquid.number_path)  # noqa: E731
+    state = eqx.tree_at(cloud, state, (mass, number))
+
+    def solve(state):
+        return brf(state, BANDS, **OPTIONS)[..., 0]
+
+    read, mapped, traced = solve(state), jax.vmap(solve)(state), jax.jit(solve)(state)
+    exact = brf(state, BANDS, num_doublings=14, **OPTIONS)[..., 0]
+    np.testing.assert_allclose(read, exact, rtol=1e-11)
+    np.testing.assert_array_equal(mapped, read)
+    np.testing.assert_allclose(traced[0], exact[0], rtol=1e-8)
+    assert np.isnan(traced[1])
+
+
+@pytest.mark.slow
+def test_second_derivatives():
+    """Forward over reverse and reverse over reverse, against differences of the first."""
+    state = columns(1)
+    point = jnp.asarray([0.4, 0.3])
+
+    def of(x):
+        chosen = lambda s: (s.atmosphere.plumes["smoke"].brightness, s.albedo["C01"])  # noqa: E731
+        changed = eqx.tree_at(chosen, state, (x[:1], x[1:]))
+        return brf(changed, BANDS, num_doublings=2, **OPTIONS)[0, 0]
+
+    slope = jax.jit(jax.grad(of))
+    step = 1e-5
+    expected = np.stack(
+        [(slope(point + step * e) - slope(point - step * e)) / (2 * step) for e in np.eye(2)]
+    )
+    for second in (jax.jacfwd(jax.grad(of)), jax.jacrev(jax.grad(of))):
+        np.testing.assert_allclose(jax.jit(second)(point), expected, rtol=1e-6, atol=1e-9)

@@ -1,0 +1,167 @@
+"""Levels at the edges of plumes: what they keep, what they move, and their derivatives."""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator import (
+    BANDS,
+    Geometry,
+    Hydrometeor,
+    LiquidCloud,
+    State,
+    brf,
+    mie_plume,
+    standard_atmosphere,
+    with_plume_edges,
+)
+from abi_operator.optics import aerosol
+
+# Rounding of some ten additions and of a telescoping sum.
+ROUNDING = 1e-12
+
+
+def make_air(num_levels=27, base=1130.0, top=2890.0, highest=20e3):
+    """Standard air with smoke, ash, cloud and snow, on equal levels above ground at 200 m."""
+    height = np.linspace(highest, 200.0, num_levels)
+    layers = num_levels - 1
+    cloud = jnp.zeros(layers).at[-3].set(0.02)
+    snow = jnp.zeros(layers).at[layers // 2].set(0.01)
+    return standard_atmosphere(
+        "us_standard",
+        height,
+        liquid=LiquidCloud(cloud, 6e11 * cloud),
+        plumes={
+            "smoke": mie_plume("smoke", 0.8, effective_radius_um=0.2, base=base, top=top),
+            "ash": mie_plume("ash", 0.5, effective_radius_um=2.0, base=8050.0, top=11060.0),
+        },
+        hydrometeors={"snow": Hydrometeor(snow, 1e6 * snow)},
+    )
+
+
+def with_smoke(air, base, top):
+    edges = lambda a: (a.plumes["smoke"].base, a.plumes["smoke"].top)  # noqa: E731
+    return eqx.tree_at(edges, air, (jnp.asarray(base), jnp.asarray(top)))
+
+
+def depths(air):
+    """Optical depth of the smoke's layers in C01."""
+    return aerosol(air, "smoke", BANDS["C01"]).tau[0]
+
+
+def test_depth_is_extinction_times_thickness_on_any_levels():
+    for air in (make_air(n) for n in (10, 27, 50)):
+        coefficient = aerosol(make_air(2), "smoke", BANDS["C01"]).tau.sum()
+        for levels in (air, with_plume_edges(air)):
+            np.testing.assert_allclose(depths(levels).sum(), coefficient, rtol=ROUNDING)
+
+
+def test_levels_are_at_the_edges_and_nothing_is_lost():
+    air = make_air()
+    new = with_plume_edges(air)
+    assert new.height.size == air.height.size + 4
+    assert np.all(np.diff(new.height) < 0) and np.all(np.diff(new.pressure) > 0)
+    for edge in (1130.0, 2890.0, 8050.0, 11060.0):
+        assert np.min(np.abs(new.height - 200.0 - edge)) < 0.01
+    for read in (
+        lambda a: a.liquid.mass_path,
+        lambda a: a.liquid.number_path,
+        lambda a: a.hydrometeors["snow"].mass_path,
+        lambda a: a.gases.vapour,
+        lambda a: a.gases.ozone,
+    ):
+        np.testing.assert_allclose(read(new).sum(), read(air).sum(), rtol=ROUNDING)
+    assert new.pressure[0] == air.pressure[0] and new.pressure[-1] == air.pressure[-1]
+    # Layers are full of plume or free of it, but for the millimetres between edge and level.
+    inside = np.asarray(depths(new) / -np.diff(new.height))
+    full = inside.max()
+    assert np.all(
+        (inside < 1e-4 * full) | (inside > (1 - 1e-4) * full) | (np.diff(-new.height) < 1)
+    )
+
+
+def test_new_levels_lie_where_a_standard_atmosphere_has_them():
+    """Temperature is linear between levels, pressure exponential to what a layer's warmth is."""
+    air = make_air(50)
+    new = with_plume_edges(air)
+    fine = standard_atmosphere("us_standard", new.height)
+    np.testing.assert_allclose(new.pressure, fine.pressure, rtol=2e-4)
+    np.testing.assert_allclose(new.temperature, fine.temperature, atol=0.5)
+
+
+@pytest.mark.parametrize(
+    "base, top",
+    [(0.0, 3000.0), (792.0, 2376.0), (1000.0, 30e3), (25e3, 30e3), (1000.0, 1000.0005)],
+    ids=["on the ground", "on levels", "out of the air", "above the air", "thinner than its edges"],
+)
+def test_edges_anywhere_are_harmless(base, top):
+    air = with_smoke(make_air(26), base, top)
+    new = with_plume_edges(air)
+    assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(new))
+    assert np.all(np.diff(new.height) <= 0) and np.all(np.diff(new.pressure) >= 0)
+    np.testing.assert_allclose(depths(new).sum(), depths(air).sum(), rtol=1e-9)
+    np.testing.assert_allclose(new.gases.vapour.sum(), air.gases.vapour.sum(), rtol=ROUNDING)
+    slopes = jax.jacrev(lambda x: with_plume_edges(with_smoke(air, *x)).gases.vapour)((base, top))
+    assert all(np.all(np.isfinite(x)) for x in slopes)
+
+
+def test_batches_are_columns_and_air_without_plumes_stays():
+    airs = [make_air(), with_smoke(make_air(), 400.0, 5000.0)]
+    batch = jax.tree.map(lambda *x: jnp.stack(x), *airs)
+    together = with_plume_edges(batch)
+    for k, air in enumerate(airs):
+        for a, b in zip(
+            jax.tree.leaves(together), jax.tree.leaves(with_plume_edges(air)), strict=True
+        ):
+            np.testing.assert_allclose(a[k], b, rtol=1e-14)
+    clear = dataclasses.replace(make_air(), plumes={})
+    assert with_plume_edges(clear) is clear
+
+
+SIX = ("C01", "C02", "C03", "C04", "C05", "C06")
+GEOMETRY = Geometry(jnp.asarray(0.7), jnp.asarray(0.5), jnp.asarray(2.0))
+
+
+def seen(air):
+    state = State(air, dict.fromkeys(SIX, jnp.asarray(0.15)), GEOMETRY)
+    return brf(state, SIX, num_streams=4, num_doublings=4)
+
+
+def test_reflectances_hardly_move():
+    """By under 1e-4 in C01 to C06, of levels 400 m apart that a plume's edges do not meet.
+
+    The smoke lies above the cloud: an edge in a cloud's own layer, where it says how much smoke is
+    above droplets, moves C01 by 4e-4.
+    """
+    air = make_air(51, base=1300.0)
+    np.testing.assert_allclose(seen(with_plume_edges(air)), seen(air), atol=1e-4)
+
+
+def test_derivatives_in_height():
+    """Not 0, equal to differences, and on a level to the difference of a shrinking plume."""
+    air = make_air(26)  # every 792 m above the ground
+
+    @jax.jit
+    def of_edges(edges):
+        return jax.vmap(lambda e: seen(with_plume_edges(with_smoke(air, e[0], e[1]))))(edges)
+
+    slope = jax.jit(jax.jacfwd(lambda e: of_edges(e[None])[0]))
+    step = 0.5  # [m]; levels keep some mm off
+    for edges, signs in (((1130.0, 2890.0), (1, -1)), ((792.0, 2376.0), (1, -1))):
+        edges = np.asarray(edges)
+        moves = np.concatenate([np.eye(2) * sign * step * k for k in (1, 2) for sign in (1,)])
+        moves = moves * np.tile(np.asarray(signs), 2)[:, None] + 0.05 * np.tile(signs, (4, 1)) * 0
+        values = of_edges(jnp.asarray(np.concatenate([edges[None], edges + moves])))
+        found = slope(jnp.asarray(edges))
+        for k in range(2):
+            # One-sided, to second order, away from every level of the new ones.
+            one, two = values[1 + k] - values[0], values[3 + k] - values[0]
+            difference = (4 * one - two) / (2 * step * signs[k])
+            np.testing.assert_allclose(
+                found[:, k], difference, rtol=1e-4, atol=1e-6 * np.abs(found).max()
+            )
+            assert np.abs(found[:2, k]).min() > 1e-8

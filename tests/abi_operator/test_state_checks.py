@@ -1,0 +1,161 @@
+"""States that cannot be, columns by night and out of sight, and what flags say of them."""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from states import column
+
+from abi_operator import (
+    Fire,
+    Geometry,
+    Hydrometeor,
+    brf,
+    check_state,
+    outside_fitted_range,
+    quality_flags,
+    radiance,
+    reflectance_factor,
+)
+from abi_operator.nomenclature import QUALITY_FLAGS
+from abi_operator.surface import Lambertian, RossLi
+
+OPTIONS = {"num_streams": 2, "num_doublings": 3}
+BANDS = ("C01", "C06")
+
+
+def batch_of(count=3):
+    """Equal columns of a few layers."""
+    state = column(num_layers=4)
+    return jax.tree.map(lambda x: np.stack([np.asarray(x, float)] * count), state)
+
+
+def changed(state, read, column_number, value):
+    x = np.array(read(state))
+    x[column_number] = value
+    return eqx.tree_at(read, state, x)
+
+
+BAD = {
+    "mass": (lambda s: s.atmosphere.liquid.mass_path, (1, 2), -1e-3,
+             r"liquid\.mass_path of entry 2 of column 1 is -0\.001; allowed is 0 or more"),
+    "albedo": (lambda s: s.albedo["C02"], 2, 1.2,
+               r"state\.albedo\['C02'\] of column 2 is 1\.2; allowed is 0 to 1"),
+    "levels": (lambda s: s.atmosphere.height, (0, 1), 5e4,
+               r"state\.atmosphere\.height, from level to level of entry 0 of column 0"),
+    "pressure": (lambda s: s.atmosphere.pressure, (2, 3), 1e6,
+                 r"pressure, from level to level of entry 3 of column 2 .* ordered from the top"),
+    "ssa": (lambda s: s.atmosphere.plumes["ash"].ssa["C01"], 1, 1.01, r"\['ash'\]\.ssa\['C01'\]"),
+    "plume": (lambda s: s.atmosphere.plumes["smoke"].base, 1, 4000.0,
+              r"plumes\['smoke'\], top - base of column 1 is -1000\.0; allowed is above 0"),
+    "zenith": (lambda s: s.geometry.view_zenith, 0, -0.1, r"view_zenith of column 0 .* 0 to pi"),
+    "nan": (lambda s: s.geometry.relative_azimuth, 1, np.nan, "azimuth of column 1 is nan"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_errors_name_field_column_and_range(case):
+    read, where, value, message = BAD[case]
+    bad = changed(batch_of(), read, where, value)
+    with pytest.raises(ValueError, match=message):
+        check_state(bad)
+    with pytest.raises(ValueError, match=message):
+        brf(bad, BANDS, **OPTIONS)
+
+
+def test_good_states_pass_and_one_column_has_no_number():
+    check_state(batch_of())
+    with pytest.raises(ValueError, match=r"state\.albedo\['C01'\] is -0\.1; allowed is 0 to 1\.$"):
+        check_state(eqx.tree_at(lambda s: s.albedo["C01"], column(), -0.1))
+    bad = changed(batch_of(), lambda s: s.albedo["C01"], slice(1, 3), 2.0)
+    with pytest.raises(ValueError, match=r"column 1 is 2\.0 \(and 1 more\)"):
+        check_state(bad)
+
+
+def test_temperatures_and_fires_are_checked():
+    cold = dataclasses.replace(column(), surface_temperature=jnp.asarray(0.0))
+    with pytest.raises(ValueError, match="surface_temperature is 0.0; allowed is above 0"):
+        check_state(cold)
+    fire = Fire(jnp.asarray(1.5), jnp.asarray(900.0))
+    with pytest.raises(ValueError, match=r"fire\.fraction is 1\.5; allowed is 0 to 1"):
+        check_state(dataclasses.replace(column(), fire=fire))
+
+
+def test_satellites_are_known():
+    with pytest.raises(ValueError, match="GOES-20"):
+        reflectance_factor(column(), BANDS, satellite="GOES-20")
+
+
+def test_night_and_out_of_sight():
+    """Sun and satellite up, sun down, satellite down; derivatives of the first are its own."""
+    state = batch_of()
+    state = changed(state, lambda s: s.geometry.solar_zenith, 1, np.pi / 2 + 0.1)
+    state = changed(state, lambda s: s.geometry.view_zenith, 2, 1.7)
+    day = batch_of()
+
+    def total(state):
+        values = (
+            brf(state, BANDS, **OPTIONS),
+            reflectance_factor(state, BANDS, **OPTIONS),
+            radiance(state, BANDS, **OPTIONS),
+        )
+        # Columns that are not simulated take no part in a sum over those that are.
+        return sum(jnp.nansum(x) for x in values), values
+
+    slopes, values = jax.grad(total, has_aux=True)(state)
+    alone, expected = jax.grad(total, has_aux=True)(day)
+    for found, day in zip(values, expected, strict=True):
+        np.testing.assert_allclose(found[0], day[0], rtol=1e-13)
+        assert np.all(np.isnan(found[2]))
+    by_night = [x[1] for x in values]
+    assert np.all(np.isnan(by_night[0])) and np.all(by_night[1] == 0) and np.all(by_night[2] == 0)
+    for (path, a), b in zip(
+        jax.tree_util.tree_leaves_with_path(slopes), jax.tree.leaves(alone), strict=True
+    ):
+        name = jax.tree_util.keystr(path)
+        np.testing.assert_allclose(a[0], b[0], rtol=1e-10, atol=1e-12, err_msg=name)
+        assert np.all(a[1:] == 0), name
+    flags = quality_flags(state, BANDS)
+    assert flags.dtype == jnp.uint8
+    np.testing.assert_array_equal(flags, [0, QUALITY_FLAGS["night"], QUALITY_FLAGS["out_of_sight"]])
+
+
+def test_flags_of_angles_particles_and_grounds():
+    state = batch_of(6)
+    tiny = np.zeros((6, 4))
+    tiny[3, 1] = 1e-3
+    snow = Hydrometeor(tiny, 1e16 * tiny)  # crystals far below 20 um
+    state = eqx.tree_at(
+        lambda s: s.atmosphere.hydrometeors,
+        state,
+        {"snow": snow},
+        is_leaf=lambda x: isinstance(x, dict) and not x,
+    )
+    weights = np.tile([0.2, 0.05, 0.01], (6, 1))
+    weights[4], weights[5] = (0.05, 0.0, 0.05), (1.1, 0.0, 0.0)
+    grounds = {"C01": Lambertian(jnp.full(6, 0.1)), "C06": RossLi(*map(jnp.asarray, weights.T))}
+    zenith = np.full(6, 0.6)
+    sun, view = zenith.copy(), zenith.copy()
+    sun[1], view[2] = 1.45, 1.45
+    state = eqx.tree_at(
+        lambda s: (s.albedo, s.geometry), state, (grounds, Geometry(sun, view, zenith))
+    )
+    names = [
+        "",
+        "grazing_sun",
+        "grazing_view",
+        "outside_fit",
+        "ground_below_zero",
+        "ground_above_one",
+    ]
+    expected = [QUALITY_FLAGS.get(name, 0) for name in names]
+    liquid = eqx.tree_at(lambda s: s.atmosphere.liquid.mass_path, state, np.zeros((6, 4)))
+    liquid = eqx.tree_at(
+        lambda s: [p.brightness for p in s.atmosphere.plumes.values()], liquid, [np.zeros(6)] * 2
+    )
+    np.testing.assert_array_equal(quality_flags(liquid, BANDS), expected)
+    share = outside_fitted_range(liquid, BANDS)
+    np.testing.assert_array_equal(share, [[0, 0]] * 3 + [[1, 1]] + [[0, 0]] * 2)
