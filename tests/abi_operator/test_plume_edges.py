@@ -126,9 +126,9 @@ SIX = ("C01", "C02", "C03", "C04", "C05", "C06")
 GEOMETRY = Geometry(jnp.asarray(0.7), jnp.asarray(0.5), jnp.asarray(2.0))
 
 
-def seen(air):
-    state = State(air, dict.fromkeys(SIX, jnp.asarray(0.15)), GEOMETRY)
-    return brf(state, SIX, num_streams=4, num_doublings=4)
+def seen(air, bands=SIX):
+    state = State(air, dict.fromkeys(bands, jnp.asarray(0.15)), GEOMETRY)
+    return brf(state, bands, num_streams=4, num_doublings=4)
 
 
 def test_reflectances_hardly_move():
@@ -147,21 +147,21 @@ def test_derivatives_in_height():
 
     @jax.jit
     def of_edges(edges):
-        return jax.vmap(lambda e: seen(with_plume_edges(with_smoke(air, e[0], e[1]))))(edges)
+        def one(e):
+            return seen(with_plume_edges(with_smoke(air, e[0], e[1])), ("C01",))[0]
 
-    slope = jax.jit(jax.jacfwd(lambda e: of_edges(e[None])[0]))
-    step = 0.5  # [m]; levels keep some mm off
-    for edges, signs in (((1130.0, 2890.0), (1, -1)), ((792.0, 2376.0), (1, -1))):
-        edges = np.asarray(edges)
-        moves = np.concatenate([np.eye(2) * sign * step * k for k in (1, 2) for sign in (1,)])
-        moves = moves * np.tile(np.asarray(signs), 2)[:, None] + 0.05 * np.tile(signs, (4, 1)) * 0
-        values = of_edges(jnp.asarray(np.concatenate([edges[None], edges + moves])))
+        return jax.vmap(one)(edges)
+
+    slope = jax.jit(jax.grad(lambda e: of_edges(e[None])[0]))
+    # Up for the base and down for the top, into the plume. [m] Levels keep some mm off.
+    step = np.diag([0.5, -0.5])
+    for edges in (np.array([1130.0, 2890.0]), np.array([792.0, 2376.0])):
+        values = of_edges(
+            jnp.asarray(np.concatenate([edges[None], edges + step, edges + 2 * step]))
+        )
         found = slope(jnp.asarray(edges))
-        for k in range(2):
-            # One-sided, to second order, away from every level of the new ones.
-            one, two = values[1 + k] - values[0], values[3 + k] - values[0]
-            difference = (4 * one - two) / (2 * step * signs[k])
-            np.testing.assert_allclose(
-                found[:, k], difference, rtol=1e-4, atol=1e-6 * np.abs(found).max()
-            )
-            assert np.abs(found[:2, k]).min() > 1e-8
+        # One-sided, to second order.
+        one, two = values[1:3] - values[0], values[3:] - values[0]
+        difference = (4 * one - two) / (2 * np.diag(step))
+        np.testing.assert_allclose(found, difference, rtol=1e-4)
+        assert np.abs(found).min() > 1e-8
