@@ -21,7 +21,7 @@ def run_block(number, names=None):
 def test_the_operators_blocks_run():
     names = run_block(0)
     slope = names["K"].atmosphere.plumes["smoke"].ssa["C01"]
-    assert slope.shape == names["rho"].shape == (4,)
+    assert slope.shape == names["rho"].shape == (7,)
     assert slope[0] > 0 and (slope[1:] == 0).all()
     names = run_block(1, names)
     seen = names["observe_mean"](names["seen"][-1], "C07")

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from abi_operator import BANDS, Geometry, State, brf, radiance, standard_atmosphere
 from abi_operator.optics import column_optics
@@ -51,6 +52,7 @@ def test_equals_the_solver_called_by_hand():
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_sea_shines_by_what_it_does_not_reflect():
     state = make_state()
     sea = state.albedo["C07"]
@@ -67,6 +69,7 @@ def test_sea_shines_by_what_it_does_not_reflect():
     np.testing.assert_allclose(radiance(state, ("C07",), **OPTIONS)[0], expected, rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_derivatives_to_weights_and_wind():
     state = make_state()
 

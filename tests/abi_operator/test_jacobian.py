@@ -135,5 +135,6 @@ def test_every_leaf():
 
 @pytest.mark.slow
 def test_every_leaf_in_all_bands(scale):
-    state = rich_state(tuple(BANDS), max(3, round(10 * scale)))
-    check(state, tuple(BANDS), num_streams=4, num_doublings=4)
+    """At full scale; a sample takes those of the most exponential terms and of none."""
+    bands = tuple(BANDS) if scale == 1 else ("green", "C06")
+    check(rich_state(bands, max(3, round(10 * scale))), bands, num_streams=4, num_doublings=4)

@@ -128,7 +128,7 @@ GEOMETRY = Geometry(jnp.asarray(0.7), jnp.asarray(0.5), jnp.asarray(2.0))
 
 def seen(air, bands=SIX):
     state = State(air, dict.fromkeys(bands, jnp.asarray(0.15)), GEOMETRY)
-    return brf(state, bands, num_streams=4, num_doublings=4)
+    return brf(state, bands, num_streams=2, num_doublings=4)
 
 
 def test_reflectances_hardly_move():
