@@ -16,6 +16,7 @@ import jax.numpy as jnp
 from jax.experimental.xla_metadata import set_xla_metadata
 from jax.extend.core import ClosedJaxpr, Primitive, jaxpr_as_fun
 from jax.interpreters import ad, batching, mlir
+from jax.interpreters import partial_eval as pe
 
 # Rows of matrices up to which a layer is one kernel: see `one_kernel`.
 _LARGEST, _LARGEST_OF_FLOAT32 = 8, 4
@@ -38,6 +39,11 @@ def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., An
     they are. So is a function with an operation of the first kind (of very many layers), and so
     are derivatives of `function` and what `jax.vmap` makes of it, in which nobody has counted.
 
+    Nor does XLA compile a kernel with an argument that is of no use in it (the process ends with
+    "All or none of the slices should have an explicit index"). Arguments that `function` does not
+    read are left out here, and empty ones make it be left as it is. One whose use XLA optimises
+    away, such as the number of the one entry that there is, must not be given.
+
     Parameters
     ----------
     function
@@ -56,9 +62,13 @@ def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., An
             return function(*jax.tree.unflatten(structure, leaves))
 
         jaxpr, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
-        if _largest_operation(jaxpr.jaxpr) >= _SHARED_FROM:
+        body, used = pe.dce_jaxpr(jaxpr.jaxpr, [True] * len(jaxpr.jaxpr.outvars))
+        wanted = [x for x, use in zip(leaves, used, strict=True) if use]
+        empty = any(x.size == 0 for x in wanted)
+        if empty or _largest_operation(body) >= _SHARED_FROM:
             return function(*args)
-        return jax.tree.unflatten(jax.tree.structure(shape), _one_kernel.bind(*leaves, jaxpr=jaxpr))
+        results = _one_kernel.bind(*wanted, jaxpr=ClosedJaxpr(body, jaxpr.consts))
+        return jax.tree.unflatten(jax.tree.structure(shape), results)
 
     return call
 

@@ -273,27 +273,33 @@ def _mode(
 
     `kept` is room for what is kept of all layers, given back filled: modes that share it do not
     clear it, nor copy it, one after the other. Layers are read and written inside the kernels: as
-    inputs and outputs of a scan every array would be one more kernel a layer.
+    inputs and outputs of a scan every array would be one more kernel a layer. Matrices lie in it
+    as one row each: LLVM unrolls a copy of 64 numbers whole, number by number, before it could
+    make vectors of it.
     """
-    num_nodes = layers.even.shape[1]
+    numbers = jnp.arange(layers.tau.shape[0], dtype=layers.tau.dtype)
+
+    def compiled(function):
+        # A layer that is the only one fills the room: in the kernel XLA finds no use for its
+        # number, nor for what was in the room (see `one_kernel`).
+        return function if numbers.size == 1 else one_kernel(function, layers.even.shape[1])
 
     def put_on(stack, layer, kernels, view_secant):
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return climb(stack, a, p, layer.tau, num_doublings)
 
-    @partial(one_kernel, num_nodes=num_nodes)
+    @compiled
     def put_on_and_keep(stack, kept, layers, number, kernels, view_secant):
         stack, new = put_on(stack, _one_of(layers, number), kernels, view_secant)
-        return stack, _with_one(kept, number, new)
+        return stack, _with_one(kept, number, jax.tree.map(jnp.ravel, new))
 
     def up(carry, number):
         return put_on_and_keep(*carry, layers, number, kernels, view_secant), None
 
-    numbers = jnp.arange(layers.tau.shape[0], dtype=layers.tau.dtype)
+    first = _one_of(layers, 0)
+    shapes = jax.eval_shape(lambda: put_on(ground, first, kernels, view_secant)[1])
     if kept is None:
-        first = _one_of(layers, 0)
-        shapes = jax.eval_shape(lambda: put_on(ground, first, kernels, view_secant)[1])
-        kept = jax.tree.map(lambda x: jnp.zeros((numbers.size, *x.shape), x.dtype), shapes)
+        kept = jax.tree.map(lambda x: jnp.zeros((numbers.size, x.size), x.dtype), shapes)
     (stack, kept), _ = jax.lax.scan(up, (ground, kept), numbers, reverse=True)
     reflection, fields = _fields_at_the_top(stack, weight)
 
@@ -309,10 +315,11 @@ def _mode(
         step = 0.5 / 2**num_doublings
         return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
 
-    @partial(one_kernel, num_nodes=num_nodes)
+    @compiled
     def undo_one(carry, layers, kept, number, kernels, view_secant):
         fields, totals, slopes = carry
         layer, own = _one_of((layers, kept), number)
+        own = jax.tree.map(lambda x, like: x.reshape(like.shape), own, shapes)
         fields, totals, new = undo(fields, totals, layer, own, kernels, view_secant)
         return fields, totals, _with_one(slopes, number, new)
 

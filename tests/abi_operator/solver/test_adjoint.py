@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from surfaces import Bowl
 
+from abi_operator.solver import toa_brf
 from abi_operator.solver.adjoint import ModeSum, mode_sum, reflectance_and_gradient
 from abi_operator.solver.azimuth import (
     Directions,
@@ -129,13 +130,44 @@ def test_value_and_gradient_come_together():
     assert jax.tree.map(jnp.shape, gradient) == jax.tree.map(jnp.shape, inputs)
 
 
-def test_one_mode_alone():
-    inputs = as_modes(columns(4), 4, general=False)
+@pytest.mark.parametrize("general", [False, True])
+def test_one_mode_alone(general):
+    inputs = as_modes(columns(4), 4, general)
+    if general:
+        inputs = inputs._replace(grounds=jax.tree.map(lambda x: x[:0], inputs.grounds))
     beams = tuple(table[:1] for table in inputs.beams)
     inputs = inputs._replace(beams=beams, weights=inputs.weights[:1])
     value, gradient = reflectance_and_gradient(inputs, 1, True)
     np.testing.assert_allclose(value, mode_sum(inputs, 1, True), rtol=AGREE)
     np.testing.assert_allclose(gradient.weights[0] * inputs.weights[0], value, rtol=AGREE)
+
+
+def test_one_layer_alone():
+    """It takes kernels of its own, in more than one tile; an empty layer below changes nothing."""
+    *layer, albedo, mu0, mu, azimuth = solver_arguments(1000)
+    below = 0 * layer[0], *layer[1:]
+    two = [np.concatenate(x, axis=1) for x in zip(layer, below, strict=True)]
+
+    others = albedo, mu0, mu, azimuth
+
+    def total(arguments):
+        return jnp.sum(toa_brf(*arguments, num_streams=4, num_doublings=2))
+
+    value, slopes = jax.value_and_grad(total)([*layer, *others])
+    expected, wanted = jax.value_and_grad(total)([*two, *others])
+    np.testing.assert_allclose(value, expected, rtol=AGREE)
+    for slope, right in zip(slopes, wanted, strict=True):
+        right = right[:, :1] if slope.ndim > 1 else right
+        np.testing.assert_allclose(slope, right, rtol=0, atol=AGREE * np.abs(right).max())
+
+
+def solver_arguments(count):
+    """One layer a column, another in each."""
+    rng = np.random.default_rng(5)
+    tau, ssa = 10 ** rng.uniform(-2, 1, (count, 1)), rng.uniform(0.5, 1, (count, 1))
+    moments = rng.uniform(0.2, 0.8, (count, 1, 1)) ** np.arange(5)
+    cosines = rng.uniform(0.2, 0.95, (2, count))
+    return tau, ssa, moments, rng.uniform(0, 0.8, count), *cosines, rng.uniform(0, np.pi, count)
 
 
 def test_constants_cost_nothing():
