@@ -43,13 +43,9 @@ def tile_size(num_streams: int, dtype: Any) -> int:
     if jax.default_backend() != "cpu":
         return _GPU_TILE
     single = jnp.dtype(dtype) == jnp.float32
-    if num_streams <= 4:
-        return 64
-    if num_streams <= 8:
-        return 64 if single else 128
-    if num_streams <= 16:
-        return 128 if single else 64
-    return 64 if single else 32
+    if num_streams > 16:
+        return 64 if single else 32
+    return 128 if single and num_streams > 8 else 64
 
 
 def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:

@@ -29,7 +29,9 @@ _one_kernel = Primitive("one_kernel")
 _one_kernel.multiple_results = True
 
 
-def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., Any]:
+def one_kernel(
+    function: Callable[..., Any], num_nodes: int, in_parts: bool = False
+) -> Callable[..., Any]:
     """`function`, of matrices with `num_nodes` rows and a tile of columns, as one kernel.
 
     XLA has neither code in it for a ``dot`` nor for an operation that it would share among threads,
@@ -50,12 +52,15 @@ def one_kernel(function: Callable[..., Any], num_nodes: int) -> Callable[..., An
         Of pytrees of arrays, to a pytree of arrays. It must not close over traced arrays.
     num_nodes
         Rows of the matrices.
+    in_parts
+        Whether no operation in float32 has more arithmetic than bytes, either, because long sums
+        come in parts (`_numerics.product`, `_numerics.weighted_sum`).
     """
 
     def call(*args: Any) -> Any:
         leaves, structure = jax.tree.flatten(args)
         double = jnp.result_type(*leaves) == jnp.float64
-        if num_nodes > (_LARGEST if double else _LARGEST_OF_FLOAT32):
+        if num_nodes > (_LARGEST if double or in_parts else _LARGEST_OF_FLOAT32):
             return function(*args)
 
         def flat(*leaves: Any) -> Any:

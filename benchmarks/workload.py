@@ -234,16 +234,18 @@ def state_jacobian(options, transform, num_layers):
         layers = tau * jnp.exp(bent[0]), 1 - (1 - ssa) * jnp.exp(bent[1]), moments
         return solve(*layers, ground_albedo, mu0, mu, azimuth, phase, **options)
 
-    def one(state, pixel):
-        return bands(state, pixel), transform(bands)(state, pixel)
+    def twice(state, pixel):
+        brf = bands(state, pixel)
+        return brf, brf
 
-    program = jax.jit(jax.vmap(one))
+    # The value comes from the program that computes the Jacobian, as its auxiliary result.
+    program = jax.jit(jax.vmap(transform(twice, has_aux=True)))
 
     def run(given: Columns):
         pixels = len(given.mu0) // NUM_BANDS
         arrays = [x[: pixels * NUM_BANDS] for x in vars(given).values()]
         arrays = [x.reshape(pixels, NUM_BANDS, *x.shape[1:]) for x in arrays]
-        brf, jacobian = read_back(program(np.zeros((pixels, NUM_STATES)), arrays))
+        jacobian, brf = read_back(program(np.zeros((pixels, NUM_STATES)), arrays))
         return brf.ravel(), jacobian
 
     return run

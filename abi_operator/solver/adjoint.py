@@ -118,7 +118,7 @@ def _reflectance(
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return add_layer(stack, *half_layer(a, p, layer.tau, num_doublings), layer.tau)
 
-    put_on = one_kernel(put_on, modes.num_nodes)
+    put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
 
     def reflection(layers, kernels, ground):
         def add(stack, layer):
@@ -277,18 +277,19 @@ def _mode(
     as one row each: LLVM unrolls a copy of 64 numbers whole, number by number, before it could
     make vectors of it.
     """
-    numbers = jnp.arange(layers.tau.shape[0], dtype=layers.tau.dtype)
+    num_layers, num_nodes = layers.even.shape[:2]
+    numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
 
-    def compiled(function):
+    def compiled(function, **how):
         # A layer that is the only one fills the room: in the kernel XLA finds no use for its
         # number, nor for what was in the room (see `one_kernel`).
-        return function if numbers.size == 1 else one_kernel(function, layers.even.shape[1])
+        return function if numbers.size == 1 else one_kernel(function, num_nodes, **how)
 
     def put_on(stack, layer, kernels, view_secant):
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return climb(stack, a, p, layer.tau, num_doublings)
 
-    @compiled
+    @partial(compiled, in_parts=True)
     def put_on_and_keep(stack, kept, layers, number, kernels, view_secant):
         stack, new = put_on(stack, _one_of(layers, number), kernels, view_secant)
         return stack, _with_one(kept, number, jax.tree.map(jnp.ravel, new))

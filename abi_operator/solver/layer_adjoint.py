@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import fenced, matmul, weighted
+from .._numerics import fenced, product, weighted
 from .bordered import Bordered, Quotient, minus_and_quotient
 from .fields import Action, Edge, Fields, act, advance, edge, pair, split
 from .layer import ModeKernels, conservative, layer_matrix, start_coefficient
@@ -59,7 +59,6 @@ class Kept(NamedTuple):
     fraction: Edge
     inner: _Part
     by_a: _Part
-    by_fraction: _Part
     admittances: list[Edge]
     doublings: list[_Part]
     adding: Action
@@ -82,9 +81,8 @@ def climb(
     inner = _combined([5.0, start_coefficient(num_doublings) * square], [p, a])
     fraction, inner = minus_and_quotient([(1 / 3, a)], square / 9, a, inner, a)
     z = _combined([1.0, square], [p, fraction])
-    y, by_fraction = minus_and_quotient([(h, a)], h * square, a, z, fraction)
-    source = _source(a.border, z.border, a.diagonal, z.diagonal)
-    by_a = _Part(matmul(by_fraction.inverse, a.core), matmul(by_fraction.inverse, source))
+    # A Z^-1 C from the other side, whose quotient gives that by C with one product (`_chained`).
+    y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a)
     admittances, doublings = [], []
     for _ in range(num_doublings):
         z = _combined([1.0, h], [z, y])
@@ -102,18 +100,12 @@ def climb(
         _open_edge(a),
         _open_edge(fraction),
         _part(inner),
-        by_a,
-        _part(by_fraction),
+        _part(by_a),
         admittances,
         doublings,
         adding,
     )
     return stack, kept
-
-
-@fenced
-def _source(border, middle, own, middle_own):
-    return border - middle * (own / middle_own)
 
 
 @fenced
@@ -124,6 +116,15 @@ def _combined(weights, matrices):
         for x in zip(*map(jax.tree.leaves, matrices), strict=True)
     ]
     return jax.tree.unflatten(jax.tree.structure(matrices[0]), sums)
+
+
+@fenced
+def _chained(square, by_a, inner, ratio):
+    """Z^-1 C from U = Z^-1 A and V, with C = A (1/3 - (h^2 / 9) V)."""
+    ninth = square / 9
+    core = by_a.core / 3 - ninth * product(by_a.core, inner.core)
+    passed = product(by_a.core, inner.border) + by_a.border * ratio
+    return core, by_a.border / 3 - ninth * passed
 
 
 class _Diagonals(NamedTuple):
@@ -197,10 +198,13 @@ def descend(
     y_bar, z_bar = pair(2.0, mean), pair(0.5, drop)
     for k in reversed(range(num_doublings - by_fields)):
         y_bar, z_bar = undouble(quotients[k], start * 2.0**k, y_bar, z_bar)
+    by_inner = _quotient(kept.inner, a, inner)
+    by_a = _quotient(kept.by_a, a, z[0])
+    by_fraction = _Part(*_chained(square, kept.by_a, kept.inner, by_inner.ratio))
     a_bar, p_bar = undo_start(
-        _quotient(kept.inner, a, inner),
-        _quotient(kept.by_a, a, z[0]),
-        _quotient(kept.by_fraction, fraction, z[0]),
+        by_inner,
+        by_a,
+        _quotient(by_fraction, fraction, z[0]),
         square,
         start_coefficient(num_doublings),
         y_bar,
