@@ -67,18 +67,23 @@ def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
     if count == 1:
         return function(columns)
 
+    # Columns are cut into tiles while their axis is the first, as callers give them, and turned
+    # one tile at a time, in the cache: XLA drops what turns all of them to and fro.
     def tiled(x: Array) -> Array:
-        padding = [(0, 0)] * (x.ndim - 1) + [(0, count * width - size)]
-        return jnp.moveaxis(
-            jnp.pad(x, padding, mode="edge").reshape(*x.shape[:-1], count, width), -2, 0
-        )
+        padding = [(0, count * width - size)] + [(0, 0)] * (x.ndim - 1)
+        first = jnp.pad(jnp.moveaxis(x, -1, 0), padding, mode="edge")
+        return first.reshape(count, width, *first.shape[1:])
 
     def joined(x: Array) -> Array:
-        return jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], count * width)[..., :size]
+        return jnp.moveaxis(x.reshape(count * width, *x.shape[2:])[:size], 0, -1)
+
+    def of_tile(columns: Any) -> Any:
+        result = function(jax.tree.map(lambda x: jnp.moveaxis(x, 0, -1), columns))
+        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), result)
 
     def mapped(tiles: Any) -> Any:
         # Reverse mode computes a tile again when its turn comes: its memory is that of a tile.
-        return jax.lax.map(jax.checkpoint(function), tiles)
+        return jax.lax.map(jax.checkpoint(of_tile), tiles)
 
     if len(devices) > 1:
         mapped = _divided(mapped, devices, _SHARE)
