@@ -1,5 +1,6 @@
 """Light scattered or reflected once, exactly, and its angle."""
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -55,8 +56,10 @@ def exact_single_scattering(
     """
     secant = 1 / mu + sun_secants[:, None]
     slant = secant * tau[:, None]
-    # Summed without the layer itself: taking a thick layer out again would cost its digits.
-    above = jnp.concatenate([jnp.zeros_like(slant[:1]), jnp.cumsum(slant[:-1], axis=0)])
+    # Summed without the layer itself: taking a thick layer out again would cost its digits. Not by
+    # `jnp.cumsum`, a sum over windows that XLA's CPU backend computes number by number.
+    layers_above = jnp.tri(tau.shape[0], k=-1, dtype=tau.dtype)
+    above = jnp.tensordot(layers_above, slant, axes=1, precision=jax.lax.Precision.HIGHEST)
     source = scattering_ratio[:, None] * phase_function * jnp.exp(-above)
     return jnp.sum(source * -jnp.expm1(-slant) / secant, axis=0) / (4 * mu * mu0)
 
