@@ -13,7 +13,7 @@ caller settles what runs where: by `jax.default_device`, a mesh, or several proc
 Where a batch divides evenly, it is divided as it comes, before anything is done to it
 (`on_every_device`): each device then copies and transposes its own columns and nothing is
 exchanged. Left to XLA, to pad, transpose and cut an array of which each device holds a part takes a
-few dozen exchanges, 4 ms a call, as long as 500 columns of 4 streams.
+few dozen exchanges, as long as some hundred columns of 4 streams.
 """
 
 import math
@@ -37,8 +37,8 @@ def tile_size(num_streams: int, dtype: Any) -> int:
     """Columns that are solved together, at most.
 
     The fewer, the more of a layer is in the cache next to the processor; the more, the less the
-    start of a kernel counts. Where a layer is one kernel (`_kernels`) a tile is also small enough
-    for that; float32 is beyond 8 streams not.
+    start of a kernel counts; below 64 LLVM unrolls loops over them number by number, without
+    vectors. Where a layer is one kernel (`_kernels`) a tile is also small enough for that.
     """
     if jax.default_backend() != "cpu":
         return _GPU_TILE

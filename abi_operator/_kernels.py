@@ -37,9 +37,10 @@ def one_kernel(
     XLA has neither code in it for a ``dot`` nor for an operation that it would share among threads,
     and does not compile a program with one: an operation on half a megabyte, or of more arithmetic
     than bytes on 20 kilobytes. With the tiles of `_batching` there is none of the second kind up to
-    8 rows in float64, nor up to 4 in float32, whose bytes are half as many; larger ones are left as
-    they are. So is a function with an operation of the first kind (of very many layers), and so
-    are derivatives of `function` and what `jax.vmap` makes of it, in which nobody has counted.
+    8 rows in float64, nor up to 4 in float32, whose bytes are half as many (8 where sums come
+    `in_parts`); larger ones are left as they are. So is a function with an operation of the first
+    kind (of very many layers), and so are derivatives of `function` and what `jax.vmap` makes of
+    it, in which nobody has counted.
 
     Nor does XLA compile a kernel with an argument that is of no use in it (the process ends with
     "All or none of the slices should have an explicit index"). Arguments that `function` does not

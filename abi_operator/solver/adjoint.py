@@ -27,6 +27,7 @@ all over h. A layer depends on hA and hB alone, so that its derivative in h is
 :math:`\langle\bar A, A\rangle + \langle\bar B, B\rangle`.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -49,7 +50,7 @@ from .pull_back import MatrixSlopes, undo_matrix
 
 Kernels = tuple[ModeKernels, ModeKernels]
 
-_FEW_NODES = 2
+_WHOLE = 2  # nodes up to which all layers of all modes are one kernel
 
 
 class ModeSum(NamedTuple):
@@ -104,9 +105,8 @@ def mode_sum(
     """
     value = partial(_reflectance, num_doublings=num_doublings, single_scattering=single_scattering)
     num_nodes = inputs.moments[0].shape[1]
-    # All layers of all modes in one kernel take a fifth less time at 4 streams, but a tenth at 8
-    # and twice the time to compile.
-    return (one_kernel(value, num_nodes) if num_nodes <= _FEW_NODES else value)(inputs)
+    # With more nodes there is less to gain, and more than twice as much to compile.
+    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(inputs)
 
 
 def _reflectance(
@@ -280,7 +280,7 @@ def _mode(
     num_layers, num_nodes = layers.even.shape[:2]
     numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
 
-    def compiled(function, **how):
+    def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
         # A layer that is the only one fills the room: in the kernel XLA finds no use for its
         # number, nor for what was in the room (see `one_kernel`).
         return function if numbers.size == 1 else one_kernel(function, num_nodes, **how)
@@ -289,13 +289,14 @@ def _mode(
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return climb(stack, a, p, layer.tau, num_doublings)
 
-    @partial(compiled, in_parts=True)
     def put_on_and_keep(stack, kept, layers, number, kernels, view_secant):
         stack, new = put_on(stack, _one_of(layers, number), kernels, view_secant)
         return stack, _with_one(kept, number, jax.tree.map(jnp.ravel, new))
 
+    put_one = compiled(put_on_and_keep, in_parts=True)
+
     def up(carry, number):
-        return put_on_and_keep(*carry, layers, number, kernels, view_secant), None
+        return put_one(*carry, layers, number, kernels, view_secant), None
 
     first = _one_of(layers, 0)
     shapes = jax.eval_shape(lambda: put_on(ground, first, kernels, view_secant)[1])

@@ -36,7 +36,7 @@ STREAMS = 8
 DOUBLINGS = 10
 FLOOR = 1e-3  # BRF below which differences are absolute
 # Nearly all columns agree to 1e-10. What remains is CDISORT's, which ends a column at an absorption
-# depth of 10 (C04), spheres left out of sums, and tables that the package unpacks in float32.
+# depth of 10 (C04), and spheres left out of sums.
 EQUAL = 1e-6
 # Of BRF, between tables of phase functions and Mie theory itself: 1e-5 is found. (Of ash sums over
 # any other spheres differ by more.)
