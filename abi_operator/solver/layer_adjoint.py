@@ -166,7 +166,7 @@ def descend(
     kept: Kept,
     num_doublings: int,
 ) -> tuple[Fields, Bordered, Bordered]:
-    """Fields below a layer from those above, and cotangents of A and B over h (see `adjoint`)."""
+    """Fields below a layer from those above; cotangents of A and B over h (`mode_slopes`)."""
     h = 0.5 * tau
     drop = act(kept.adding, fields)
     mean, below = advance(fields, drop, 0.5 * h), advance(fields, drop, h)

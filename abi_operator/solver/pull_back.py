@@ -2,7 +2,7 @@ r"""Pull-backs of the parts of one layer: doublings, start, inverse, and what A 
 
 Cotangents are `Bordered`, with a symmetric core where the next step asks for one. Of the admittance
 Y_e they are P, of the impedance hQ with the half thickness h of that stage, of A and B they are
-`adjoint`'s over h: nothing is ever divided by h.
+`mode_slopes`'s over h: nothing is ever divided by h.
 """
 
 from typing import NamedTuple

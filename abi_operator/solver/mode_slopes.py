@@ -1,0 +1,172 @@
+r"""One mode's reflection and its slopes: one pass up the layers, one down.
+
+At the top :math:`F_i = (1+Y)^{-1} e_i` for sun and view, and the reflection's derivative is
+-pair(F)/2 in Y. Going down through a layer of half thickness h, with the quotient of its adding
+step (`adding`) :math:`N = S^{-1}(Y + Y_e)F`,
+
+.. math:: \sigma = F - hN/2, \qquad F' = F - hN,
+
+the cotangent of Y_e is P = 2 pair(sigma), that of Z is hQ with Q = pair(N)/2, and F' are the fields
+below. A doubling with quotient R is undone by
+
+.. math::
+   Q \leftarrow 2Q + 2(R\otimes R)P, \qquad P \leftarrow 2P - 2h(R\oplus R)P + h^2Q,
+
+or, as long as pairs of fields are fewer than nodes, by splitting a pair into two,
+:math:`\sigma \leftarrow \sigma - hR\sigma \pm hN/2`, :math:`N \leftarrow N \pm 2R\sigma`. At the
+start (`layer.half_layer`), with :math:`U = Z^{-1}A`, :math:`W = Z^{-1}C`,
+:math:`V = (5B^{-1} + dh^2A)^{-1}A` and :math:`M = (U\otimes W + W\otimes U)P/2`,
+
+.. math::
+   \bar Z &= Q - (U\oplus U)P/2 + h^2M, \\
+   \bar A &= P - h^2(W\oplus W)P/2
+       + h^2[1/3 - \tfrac{h^2}{9}(V\oplus V) + \tfrac{dh^4}{9}V\otimes V]\bar Z, \\
+   \bar B &= -(B^{-1}\otimes B^{-1})[Q + h^2M + \tfrac{5h^4}{9}(V\otimes V)\bar Z],
+
+all over h. A layer depends on hA and hB alone, so that its derivative in h is
+:math:`\langle\bar A, A\rangle + \langle\bar B, B\rangle`.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .._kernels import one_kernel
+from .._numerics import fenced, matmul
+from .adding import top
+from .bordered import Bordered
+from .fields import Fields, pair
+from .layer import ModeKernels
+from .layer_adjoint import Layer, climb, descend
+from .pull_back import MatrixSlopes, undo_matrix
+
+Kernels = tuple[ModeKernels, ModeKernels]
+
+
+class Slopes(NamedTuple):
+    """Of one mode, in what its layers and beams are made of and in its ground."""
+
+    layers: Layer
+    even_beams: Float[Array, "2 degree *batch"]
+    odd_beams: Float[Array, "2 degree *batch"]
+    view_secant: Float[Array, "*batch"]
+    ground: Bordered
+
+
+def mode_slopes(
+    view_secant: Float[Array, "*batch"],
+    num_doublings: int,
+    single_scattering: bool,
+    layers: Layer,
+    kernels: Kernels,
+    ground: Bordered,
+    weight: Float[Array, "*batch"],
+    kept: Any,
+) -> tuple[Float[Array, "*batch"], Any, Slopes]:
+    """Reflection of a mode, and the slopes of `weight` times it.
+
+    `kept` is room for what is kept of all layers, given back filled: modes that share it do not
+    clear it, nor copy it, one after the other. Layers are read and written inside the kernels: as
+    inputs and outputs of a scan every array would be one more kernel a layer. Matrices lie in it
+    as one row each: LLVM unrolls a copy of 64 numbers whole, number by number, before it could
+    make vectors of it.
+    """
+    num_layers, num_nodes = layers.even.shape[:2]
+    numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
+
+    def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
+        # A layer that is the only one fills the room: in the kernel XLA finds no use for its
+        # number, nor for what was in the room (see `one_kernel`).
+        return function if numbers.size == 1 else one_kernel(function, num_nodes, **how)
+
+    def put_on(stack, layer, kernels, view_secant):
+        a, p = layer.matrices(kernels, view_secant, single_scattering)
+        return climb(stack, a, p, layer.tau, num_doublings)
+
+    def put_on_and_keep(stack, kept, layers, number, kernels, view_secant):
+        stack, new = put_on(stack, _one_of(layers, number), kernels, view_secant)
+        return stack, _with_one(kept, number, jax.tree.map(jnp.ravel, new))
+
+    put_one = compiled(put_on_and_keep, in_parts=True)
+
+    def up(carry, number):
+        return put_one(*carry, layers, number, kernels, view_secant), None
+
+    first = _one_of(layers, 0)
+    shapes = jax.eval_shape(lambda: put_on(ground, first, kernels, view_secant)[1])
+    if kept is None:
+        kept = jax.tree.map(lambda x: jnp.zeros((numbers.size, x.size), x.dtype), shapes)
+    (stack, kept), _ = jax.lax.scan(up, (ground, kept), numbers, reverse=True)
+    reflection, fields = _fields_at_the_top(stack, weight)
+
+    def undo(fields, totals, layer, kept, kernels, view_secant):
+        # The beams' own entries of the stack are 1 whatever happens in it.
+        fields = fields._replace(other=jnp.zeros_like(fields.other))
+        secants = layer.secants(view_secant)
+        fields, a_bar, b_bar = descend(fields, layer.tau, secants, kept, num_doublings)
+        a, coalbedo = undo_matrix(
+            kernels[0], layer.even, secants, a_bar, single_scattering, layer.coalbedo
+        )
+        b, _ = undo_matrix(kernels[1], layer.odd, secants, b_bar, single_scattering)
+        step = 0.5 / 2**num_doublings
+        return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
+
+    @compiled
+    def undo_one(carry, layers, kept, number, kernels, view_secant):
+        fields, totals, slopes = carry
+        layer, own = _one_of((layers, kept), number)
+        own = jax.tree.map(lambda x, like: x.reshape(like.shape), own, shapes)
+        fields, totals, new = undo(fields, totals, layer, own, kernels, view_secant)
+        return fields, totals, _with_one(slopes, number, new)
+
+    def down(carry, number):
+        return undo_one(carry, layers, kept, number, kernels, view_secant), None
+
+    start = tuple(jnp.zeros_like(x) for x in (kernels[0].beams, kernels[1].beams, view_secant))
+    slopes = jax.tree.map(jnp.zeros_like, layers)
+    carry, _ = jax.lax.scan(down, (fields, start, slopes), numbers)
+    fields, (even, odd, view), slopes = carry
+    return reflection, kept, Slopes(slopes, even, odd, view, pair(1.0, fields))
+
+
+def _one_of(stacks: Any, number: Any) -> Any:
+    """What arrays with one entry a layer hold of a layer.
+
+    `number` is not of integers, which have no tangents to go through `one_kernel` with.
+    """
+    read = partial(jax.lax.dynamic_index_in_dim, index=_integer(number), axis=0, keepdims=False)
+    return jax.tree.map(read, stacks)
+
+
+def _with_one(stacks: Any, number: Any, new: Any) -> Any:
+    """The same arrays with `new` in place of that."""
+    write = partial(jax.lax.dynamic_update_index_in_dim, index=_integer(number), axis=0)
+    return jax.tree.map(write, stacks, new)
+
+
+def _integer(number):
+    return jnp.asarray(number).astype(jnp.int32)
+
+
+def _fields_at_the_top(stack: Bordered, weight):
+    """Reflection, and fields whose pair is the cotangent of `weight` times it."""
+    solved = matmul(top(stack).inverse, stack.border)
+    reflection = 0.5 * (jnp.sum(stack.border[:, 1] * solved[:, 0], axis=0) - stack.corner[0])
+    scale = jnp.stack([jnp.ones_like(weight), -0.5 * weight])
+    own = scale[:, None]
+    return reflection, Fields(-(scale * solved)[:, :, None], own, jnp.zeros_like(own))
+
+
+@fenced
+def _collected(step, tau, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
+    """Totals over the layers, and the layer's own slopes, from those over h."""
+    h = tau * step
+    secants = h * (a.secants + b.secants)
+    beams = totals[0] + h * a.beams, totals[1] + h * b.beams
+    own = None if coalbedo is None else h * coalbedo
+    slopes = Layer(step * (a.h + b.h), own, secants[0], h * a.moments, h * b.moments)
+    return (*beams, totals[2] + secants[1]), slopes

@@ -1,0 +1,42 @@
+"""Whole layers as one kernel compile wherever XLA has threads to share operations among.
+
+The other tests run with one thread. A kernel that XLA cannot compile ends the process, hence
+processes of their own.
+"""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import sys
+import jax
+import numpy as np
+from abi_operator.solver import toa_brf
+
+jax.config.update("jax_enable_x64", True)
+num_streams, num_layers, count = map(int, sys.argv[1:])
+rng = np.random.default_rng(7)
+shape = count, num_layers
+moments = rng.uniform(0.2, 0.8, (*shape, 1)) ** np.arange(num_streams + 1)
+layers = 10 ** rng.uniform(-2, 1, shape), rng.uniform(0.8, 1, shape), moments
+others = rng.uniform(0.2, 0.9, (4, count))
+for dtype in (np.float64, np.float32):
+    arguments = [np.asarray(x, dtype) for x in (*layers, *others)]
+    total = lambda x: toa_brf(*x, num_streams=num_streams, num_doublings=2).sum()
+    value, (slope, *_) = jax.value_and_grad(total)(arguments)
+    assert np.isfinite(total(arguments)) and np.isfinite(slope).all()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "num_streams, num_layers", [(2, 3), (4, 1), (4, 3), (8, 1), (8, 3), (12, 3), (16, 3)]
+)
+def test_value_and_gradient_compile_with_every_thread(num_streams, num_layers):
+    """In both precisions, more columns than a tile has."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAX_ENABLE_X64")}
+    sizes = map(str, (num_streams, num_layers, 260))
+    subprocess.run([sys.executable, "-c", PROGRAM, *sizes], env=environment, check=True)
