@@ -7,7 +7,9 @@ which is what a CPU is fast at when matrices are small.
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -55,7 +57,19 @@ def safe_sqrt(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1)), 0)
 
 
-def product(a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"]) -> Array:
+class Rows(eqx.Module):
+    """A matrix in blocks of rows, as an elimination leaves it: to join them takes a copy."""
+
+    blocks: tuple[Float[Array, "_ col *batch"], ...]
+
+    def joined(self) -> Float[Array, "row col *batch"]:
+        """As one array."""
+        return self.blocks[0] if len(self.blocks) == 1 else jnp.concatenate(self.blocks)
+
+
+def product(
+    a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"] | Rows
+) -> Array:
     """Matrix product, batch last and broadcast, for use inside a kernel.
 
     A short sum over `inner` is written out: a chain of fused multiply-adds on whole batches, five
@@ -66,23 +80,24 @@ def product(a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#b
     """
     inner = a.shape[1]
     if inner > _WRITTEN_OUT:
+        b = b.joined() if isinstance(b, Rows) else b
         return jnp.einsum("ik...,kj...->ij...", a, b, precision=jax.lax.Precision.HIGHEST)
+    columns = [a[:, k, None] for k in range(inner)]
+    rows = [block[None, k] for block in _blocks(b) for k in range(block.shape[0])]
     if inner in _IN_PARTS and a.dtype == jnp.float32:
         half = inner // 2
-        return _written_out(_first_half(a, b), a[:, half:], b[half:])
-    return _written_out(a[:, :1] * b[:1], a[:, 1:], b[1:])
+        first = _sum_of_products(columns[:half], rows[:half])
+        return total([first, *(x * y for x, y in zip(columns[half:], rows[half:], strict=True))])
+    return total([x * y for x, y in zip(columns, rows, strict=True)])
 
 
-def _written_out(total, a, b):
-    for k in range(a.shape[1]):
-        total = total + a[:, k, None] * b[None, k]
-    return total
+def _blocks(b):
+    return b.blocks if isinstance(b, Rows) else (b,)
 
 
 @fenced
-def _first_half(a, b):
-    half = a.shape[1] // 2
-    return product(a[:, :half], b[:half])
+def _sum_of_products(columns, rows):
+    return total([x * y for x, y in zip(columns, rows, strict=True)])
 
 
 def kernel_of_product(function: Callable, inner: int) -> Callable:
@@ -93,7 +108,9 @@ def kernel_of_product(function: Callable, inner: int) -> Callable:
     return fenced(function) if inner <= _WRITTEN_OUT else function
 
 
-def matmul(a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"]) -> Array:
+def matmul(
+    a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"] | Rows
+) -> Array:
     """Matrix product, batch last and broadcast, as a kernel of its own."""
     return kernel_of_product(product, a.shape[1])(a, b)
 
@@ -106,11 +123,46 @@ def weighted(terms: Sequence[tuple[Array | float, Array]]) -> Array:
     return total
 
 
+def weighted_rows(weights: Sequence[float | Float[Array, "..."]], arrays: Sequence[Array]) -> Array:
+    """Weighted sum of arrays ``... col *batch`` as a kernel of its own, in long rows.
+
+    A loop over 32 columns with as little in it as this LLVM unrolls, number by number, before it
+    could make vectors of it; not so where all that lies in a row is one axis.
+    """
+    shape = arrays[0].shape
+    batches = [jnp.ndim(w) for w in weights if not isinstance(w, float)]
+    if not batches:
+        return _weighted(weights, [x.reshape(-1) for x in arrays]).reshape(shape)
+    col = len(shape) - max(batches) - 1
+    rows = [x.reshape(*shape[:col], -1) for x in arrays]
+    along = [w if isinstance(w, float) else _along(w, shape[col]) for w in weights]
+    return _weighted(along, rows).reshape(shape)
+
+
+def _along(weight, count):
+    if count == 1:
+        return weight.reshape(-1)
+    return fenced(lambda w: jnp.broadcast_to(w, (count, *w.shape)).reshape(-1))(weight)
+
+
+@fenced
+def _weighted(weights, arrays):
+    return weighted(list(zip(weights, arrays, strict=True)))
+
+
+def total(terms: Any) -> Array:
+    """Sum over the first axis, inside a kernel, which a reduction would cut in two."""
+    result = terms[0]
+    for k in range(1, len(terms)):
+        result = result + terms[k]
+    return result
+
+
 def minus_product(
     terms: Sequence[tuple[Array | float, Array]],
     factor: Array,
     a: Float[Array, "row inner *batch"],
-    b: Float[Array, "inner col *batch"],
+    b: Float[Array, "inner col *batch"] | Rows,
 ) -> Float[Array, "row col *batch"]:
     """Weighted sum of matrices minus `factor` times a product, in one pass over all of them."""
     return kernel_of_product(_minus_product, a.shape[1])(terms, factor, a, b)
@@ -121,89 +173,33 @@ def _minus_product(terms, factor, a, b):
 
 
 def weighted_sum(
-    matrices: Float[Array, "*shape term"], weights: Float[Array, "term *batch"]
+    matrices: Float[Array, "*shape term"],
+    weights: Float[Array, "term *batch"],
+    more: Float[Array, "*shape"] | None = None,
 ) -> Array:
-    """Sum of arrays that all columns share, weighted column by column: ``*shape *batch``."""
+    """Sum of arrays that all columns share, weighted column by column: ``*shape *batch``.
+
+    `more` is one more such array, of weight 1.
+    """
+    expand = (...,) + (None,) * (weights.ndim - 1)
+    result: Any = None if more is None else more[expand]
     if weights.shape[0] > _WRITTEN_OUT:
-        return jnp.tensordot(matrices, weights, axes=1)
+        summed = jnp.tensordot(matrices, weights, axes=1)
+        return summed if result is None else result + summed
     # Few terms at a time: `_kernels.one_kernel` asks for no more arithmetic than bytes in each.
     terms = 2 if weights.dtype == jnp.float32 else 4
-    total = _weighted_sum(matrices[..., :terms], weights[:terms])
-    for k in range(terms, weights.shape[0], terms):
-        total = _add_weighted_sum(total, matrices[..., k : k + terms], weights[k : k + terms])
-    return total
+    for k in range(0, weights.shape[0], terms):
+        result = _add_weighted_sum(result, matrices[..., k : k + terms], weights[k : k + terms])
+    return result
 
 
 @fenced
-def _weighted_sum(matrices, weights):
-    expand = (...,) + (None,) * (weights.ndim - 1)
-    return weighted([(matrices[..., k][expand], weights[k]) for k in range(weights.shape[0])])
-
-
-@fenced
-def _add_weighted_sum(total, matrices, weights):
+def _add_weighted_sum(result, matrices, weights):
     expand = (...,) + (None,) * (weights.ndim - 1)
     terms = [(matrices[..., k][expand], weights[k]) for k in range(weights.shape[0])]
-    return weighted([(1.0, total), *terms])
+    return weighted(terms if result is None else [(1.0, result), *terms])
 
 
 def transpose(a: Float[Array, "row col *batch"]) -> Float[Array, "col row *batch"]:
     """Transpose, batch last."""
     return jnp.swapaxes(a, 0, 1)
-
-
-@jax.custom_jvp
-def inverse(a: Float[Array, "n n *batch"]) -> Float[Array, "n n *batch"]:
-    """Inverse of a symmetric positive definite matrix, batch last.
-
-    Its derivative is written out, -a^-1 da a^-1, two products instead of a differentiated
-    elimination.
-    """
-    return _inverse_by_halves(a)
-
-
-@inverse.defjvp
-def _inverse_jvp(primals, tangents):
-    value = inverse(*primals)
-    return value, -matmul(matmul(value, tangents[0]), value)
-
-
-def _inverse_by_halves(a: Float[Array, "n n *batch"]) -> Float[Array, "n n *batch"]:
-    """Halving needs no pivots here: with blocks ``[[p, q], [q^T, r]]`` of a positive definite
-    matrix both p and the Schur complement r - q^T p^-1 q are positive definite again.
-    """
-    n = a.shape[0]
-    if n <= 2:
-        return _inverse_of_one_or_two(a)
-    half = n // 2
-    p_inverse = _inverse_by_halves(a[:half, :half])
-    u = kernel_of_product(_first_times_second, half)(p_inverse, a)
-    schur_inverse = _inverse_by_halves(kernel_of_product(_schur_complement, half)(a, u))
-    w = matmul(u, schur_inverse)
-    return kernel_of_product(_joined, n - half)(p_inverse, w, u, schur_inverse)
-
-
-@fenced
-def _inverse_of_one_or_two(a):
-    if a.shape[0] == 1:
-        return 1 / a
-    p, q, r = a[:1, :1], a[:1, 1:], a[1:, 1:]
-    reciprocal = 1 / (p * r - q * q)
-    upper, lower = (jnp.concatenate(row, axis=1) for row in ((r, -q), (-q, p)))
-    return jnp.concatenate([upper, lower]) * reciprocal
-
-
-def _first_times_second(p_inverse, a):
-    half = p_inverse.shape[0]
-    return product(p_inverse, a[:half, half:])
-
-
-def _schur_complement(a, u):
-    half = u.shape[0]
-    return a[half:, half:] - product(transpose(a[:half, half:]), u)
-
-
-def _joined(p_inverse, w, u, schur_inverse):
-    upper = jnp.concatenate([p_inverse + product(w, transpose(u)), -w], axis=1)
-    lower = jnp.concatenate([-transpose(w), schur_inverse], axis=1)
-    return jnp.concatenate([upper, lower])

@@ -60,7 +60,7 @@ def solver_tiles(repeats):
         arguments = columns(num_streams)
         cells = []
         for tile in tiles:
-            SOLVER.tile_size = lambda _, tile=tile: tile
+            SOLVER.tile_size = lambda *_, tile=tile, **__: tile
             jax.clear_caches()
             solve = partial(
                 toa_brf, *arguments, num_streams=num_streams, num_doublings=NUM_DOUBLINGS

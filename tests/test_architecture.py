@@ -19,7 +19,7 @@ FLOORS = [
     {"microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
     {"geometry", "planck"},
-    {"satellites"},
+    {"satellites", "_elimination"},
     {"_batching", "_kernels", "_numerics", "_version", "bands", "constants", "nomenclature"},
 ]
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}

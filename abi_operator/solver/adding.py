@@ -15,8 +15,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import inverse, matmul
-from .bordered import Bordered, Quotient, Vector, minus_and_quotient
+from .._elimination import inverse, solve
+from .._numerics import matmul
+from .bordered import Bordered, Vector, combined
+from .quotient import minus_and_quotient, minus_quotient
 
 
 class Emission(eqx.Module):
@@ -61,7 +63,9 @@ def add_layer(
     :math:`Y \leftarrow Y + 2Y_e - h(Y + Y_e)S^{-1}(Y + Y_e)`.
     The beams' own entries of Y are 1 whatever lies below, and are set so.
     """
-    return _add(stack, admittance, impedance, tau)[0]
+    h, total, middle = _sums(stack, admittance, impedance, tau)
+    base = [(1.0, total), (1.0, admittance)]
+    return _with_own_beams(minus_quotient(base, h, total, middle, total))
 
 
 def add_emitting_layer(
@@ -77,24 +81,27 @@ def add_emitting_layer(
     As `add_layer`, and :math:`e \leftarrow e - (Y + Y_e)S^{-1}(he - j)` with the layer's own
     :math:`j = (B_{bottom} - B_{top}) B^{-1} 1`, None for air that does not emit.
     """
-    h = 0.5 * tau
-    added, quotient = _add(stack, admittance, impedance, tau)
+    h, total, middle = _sums(stack, admittance, impedance, tau)
+    base = [(1.0, total), (1.0, admittance)]
+    added, quotient = minus_and_quotient(base, h, total, middle, total)
     driving = h * emission.column
     if jump is not None:
         driving = driving - jump
     column = emission.column - quotient.transposed_action(driving)
-    solved = matmul(quotient.inverse, emission.column.nodes[:, None])[:, 0]
+    solved = solve(middle.core, [emission.column.nodes[:, None]])[0].joined()[:, 0]
     returned = emission.returned + h * jnp.sum(emission.column.nodes * solved, axis=0)
-    return added, Emission(column, returned)
+    return _with_own_beams(added), Emission(column, returned)
 
 
-def _add(stack, admittance, impedance, tau) -> tuple[Bordered, Quotient]:
+def _sums(stack, admittance, impedance, tau):
+    """h, Y + Y_e and S."""
     h = 0.5 * tau
-    total = stack + admittance
-    middle = h * stack + 0.5 * (impedance + h * admittance)
-    base = [(1.0, total), (1.0, admittance)]
-    added, quotient = minus_and_quotient(base, h, total, middle, total)
-    return eqx.tree_at(lambda m: m.diagonal, added, jnp.ones_like(added.diagonal)), quotient
+    total = combined([1.0, 1.0], [stack, admittance])
+    return h, total, combined([h, 0.5, 0.5 * h], [stack, impedance, admittance])
+
+
+def _with_own_beams(stack: Bordered) -> Bordered:
+    return Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
 
 
 class Top(eqx.Module):

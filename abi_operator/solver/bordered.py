@@ -18,22 +18,17 @@ beam 0, the views follow), and no product with a cosine is ever undone by a divi
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import (
-    fenced,
-    inverse,
-    kernel_of_product,
-    matmul,
-    minus_product,
-    product,
-    weighted,
-)
+from .._elimination import inverse
+from .._numerics import fenced, matmul, total, weighted, weighted_rows
 
-_ONE_KERNEL = 2  # nodes up to which a product of three matrices is computed in one pass
+_ENOUGH_COLUMNS = 64  # for which LLVM makes vectors of any loop, see `weighted_rows`
 
 
 class Vector(eqx.Module):
@@ -114,147 +109,46 @@ class Bordered(eqx.Module):
         """Inverse of a matrix with positive definite core and diagonal."""
         core = inverse(self.core)
         solved = matmul(core, self.border)
-        between = jnp.sum(self.border[:, 1:] * solved[:, :1], axis=0)
-        return Bordered(
-            core,
-            -solved / self.diagonal,
-            1 / self.diagonal,
-            (between - self.corner) / (self.diagonal[0] * self.diagonal[1:]),
-        )
+        between = total(self.border[:, 1:] * solved[:, :1])
+        own = reciprocal(self.diagonal)
+        border, corner = _edge_of_inverse(solved, between, own, self.corner)
+        return Bordered(core, border, own, corner)
 
 
-class Quotient(eqx.Module):
-    """``middle^-1 right`` of a symmetric product, kept for acting on vectors.
+@fenced
+def _edge_of_inverse(solved, between, own, corner):
+    return -solved * own, (between - corner) * own[0] * own[1:]
 
-    Parameters
-    ----------
-    inverse
-        Inverse of the middle's core.
-    core
-        That inverse times the right core.
-    border
-        That inverse times (right border - middle border * ratio).
-    ratio
-        Right diagonal over the middle's.
+
+def combined(weights: Sequence[float | Float[Array, "..."]], matrices: Sequence[Any]) -> Any:
+    """Weighted sum of matrices, or of trees with parts of them.
+
+    One kernel, or where there are few columns one in long rows for each array.
     """
-
-    inverse: Float[Array, "node node *batch"]
-    core: Float[Array, "node node *batch"]
-    border: Float[Array, "node beam *batch"]
-    ratio: Float[Array, "beam *batch"]
-
-    def transposed_action(self, vector: Vector) -> Vector:
-        """``right middle^-1`` applied to a vector without a sun (see `Bordered.__matmul__`)."""
-        nodes = jnp.sum(self.core * vector.nodes[:, None], axis=0)
-        beams = jnp.sum(self.border * vector.nodes[:, None], axis=0)
-        return Vector(nodes, beams + self.ratio * vector.beams)
-
-
-Terms = Sequence[tuple[float | Float[Array, "*batch"], Bordered]]
-
-
-def minus_quotient(
-    base: Terms,
-    factor: Float[Array, "*batch"],
-    left: Bordered,
-    middle: Bordered,
-    right: Bordered,
-) -> Bordered:
-    """Weighted sum of `base` minus ``factor left middle^-1 right``, the solver's one operation.
-
-    `middle` has a positive definite core and diagonal. All three are functions of the same pair of
-    matrices wherever this is called, so that they commute, the product is symmetric like its
-    factors, and the views' rows are found like the sun's column. Taking the sum along saves a pass
-    over all matrices.
-    """
-    if left.core.shape[0] > _ONE_KERNEL:
-        return minus_and_quotient(base, factor, left, middle, right)[0]
-    ratio = _ratio(right.diagonal, middle.diagonal)
-    own = ratio if left is right else _ratio(left.diagonal, middle.diagonal)
-    middle_inverse = inverse(middle.core)
-    cores, borders, diagonals, corners = _parts(base)
-    drive = (left.border, right.border, middle.border, middle_inverse)
-    passed = (left.corner, right.corner, middle.corner, ratio, own)
-    return Bordered(
-        _core_at_once(cores, factor, left.core, middle_inverse, right.core),
-        _border_at_once(borders, factor, left.core, *drive, ratio),
-        _minus_diagonal(diagonals, factor, left.diagonal, ratio),
-        _corner_at_once(corners, factor, *drive, *passed),
-    )
-
-
-def minus_and_quotient(
-    base: Terms,
-    factor: Float[Array, "*batch"],
-    left: Bordered,
-    middle: Bordered,
-    right: Bordered,
-) -> tuple[Bordered, Quotient]:
-    """`minus_quotient`, and the quotient ``middle^-1 right`` that it formed on the way."""
-    ratio = _ratio(right.diagonal, middle.diagonal)
-    source = _source(right.border, middle.border, ratio)
-    middle_inverse = inverse(middle.core)
-    solved = matmul(middle_inverse, right.core)
-    driven = matmul(middle_inverse, source)
-    own, target = ratio, source
-    if left is not right:
-        own = _ratio(left.diagonal, middle.diagonal)
-        target = _source(left.border, middle.border, own)
-    cores, borders, diagonals, corners = _parts(base)
-    passed = (left.corner, right.corner, middle.corner, ratio, own)
-    minus_border = kernel_of_product(_minus_border, left.core.shape[1])
-    result = Bordered(
-        minus_product(cores, factor, left.core, solved),
-        minus_border(borders, factor, left.core, driven, left.border, ratio),
-        _minus_diagonal(diagonals, factor, left.diagonal, ratio),
-        _corner(corners, factor, target, driven, *passed),
-    )
-    return result, Quotient(middle_inverse, solved, driven, ratio)
-
-
-def _parts(base):
-    return tuple(
-        [(weight, getattr(x, part)) for weight, x in base]
-        for part in ("core", "border", "diagonal", "corner")
-    )
-
-
-def _ratio(right, middle):
-    return right / middle
-
-
-def _source(border, middle, ratio):
-    return border - middle * ratio
-
-
-def _minus_border(base, factor, core, driven, border, ratio):
-    return weighted(base) - factor * (product(core, driven) + border * ratio)
-
-
-def _minus_diagonal(base, factor, left, ratio):
-    return weighted(base) - factor * (left * ratio)
-
-
-def _corner(base, factor, target, driven, left, right, middle, ratio, own):
-    nodes = jnp.sum(target[:, 1:] * driven[:, :1], axis=0)
-    sun, views = ratio[:1], own[1:]
-    corner = nodes + left * sun + right * views - middle * sun * views
-    return weighted(base) - factor * corner
+    leaves = list(zip(*map(jax.tree.leaves, matrices), strict=True))
+    if leaves[0][0].shape[-1] >= _ENOUGH_COLUMNS:
+        return _combined(weights, matrices)
+    sums = [weighted_rows(weights, x) for x in leaves]
+    return jax.tree.unflatten(jax.tree.structure(matrices[0]), sums)
 
 
 @fenced
-def _core_at_once(base, factor, left, middle_inverse, right):
-    return weighted(base) - factor * product(left, product(middle_inverse, right))
+def _combined(weights, matrices):
+    return jax.tree.map(lambda *x: weighted(list(zip(weights, x, strict=True))), *matrices)
+
+
+def reciprocal(diagonal: Float[Array, "beam *batch"]) -> Float[Array, "beam *batch"]:
+    """``1 / diagonal``; of two beams by one division, which takes as long as 16 products."""
+    if diagonal.shape[0] != 2:
+        return fenced(lambda x: 1 / x)(diagonal)
+    return _times_other(_one_over_both(diagonal), diagonal)
 
 
 @fenced
-def _border_at_once(base, factor, core, left, right, middle, middle_inverse, ratio):
-    driven = product(middle_inverse, right - middle * ratio)
-    return weighted(base) - factor * (product(core, driven) + left * ratio)
+def _one_over_both(diagonal):
+    return 1 / (diagonal[0] * diagonal[1])
 
 
 @fenced
-def _corner_at_once(base, factor, left, right, middle, middle_inverse, *passed):
-    ratio, own = passed[-2:]
-    driven = product(middle_inverse, right[:, :1] - middle[:, :1] * ratio[:1])
-    return _corner(base, factor, left - middle * own, driven, *passed)
+def _times_other(one_over_both, diagonal):
+    return one_over_both * diagonal[::-1]

@@ -16,12 +16,12 @@ Quotients of one layer commute, so that only symmetric parts matter. Of a produc
 :math:`\langle X, dE \rangle = \langle (R\oplus R)X, dY\rangle - \langle (R\otimes R)X, dS\rangle`.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import fenced, product, transpose
+from .._numerics import fenced, product, total, transpose
 from .bordered import Bordered
 
 
@@ -44,10 +44,17 @@ class Fields(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """A bordered matrix without its core, and without diagonal where that is found elsewhere."""
+    """A bordered matrix without its core."""
 
     border: Float[Array, "node beam *batch"]
-    diagonal: Any
+    diagonal: Float[Array, "beam *batch"]
+    corner: Float[Array, "1 *batch"]
+
+
+class Feed(NamedTuple):
+    """What beams feed in a bordered matrix: nodes and each other."""
+
+    border: Float[Array, "node beam *batch"]
     corner: Float[Array, "1 *batch"]
 
 
@@ -56,22 +63,28 @@ def edge(matrix: Bordered) -> Edge:
     return Edge(matrix.border, matrix.diagonal, matrix.corner)
 
 
+def feed(matrix: Bordered) -> Feed:
+    """Border and corner."""
+    return Feed(matrix.border, matrix.corner)
+
+
 class Action(NamedTuple):
     """A quotient ``S^-1 Y`` as it acts on fields.
 
     Parameters
     ----------
-    core, border, ratio
+    core, border, ratio, over
         See `Quotient`.
     right, middle
-        What beams do in Y and in S.
+        What beams feed in Y and in S.
     """
 
     core: Float[Array, "node node *batch"]
     border: Float[Array, "node beam *batch"]
     ratio: Float[Array, "beam *batch"]
-    right: Edge
-    middle: Edge
+    over: Float[Array, "beam *batch"]
+    right: Feed
+    middle: Feed
 
 
 def act(quotient: Action, fields: Fields) -> Fields:
@@ -87,15 +100,15 @@ def _act_on_nodes(core, border, nodes, own):
 
 
 @fenced
-def _act_on_beams(ratio, right, middle, fields, nodes):
+def _act_on_beams(ratio, over, right, middle, fields, nodes):
     own = ratio[:, None] * fields.own
-    from_nodes = _other(right.border)[:, :, None] * fields.nodes
-    from_nodes = from_nodes - _other(middle.border)[:, :, None] * nodes
+    from_nodes = swapped(right.border)[:, :, None] * fields.nodes
+    from_nodes = from_nodes - swapped(middle.border)[:, :, None] * nodes
     driven = total(from_nodes) + right.corner * fields.own - middle.corner * own
-    return own, driven / middle.diagonal[::-1, None] + ratio[::-1, None] * fields.other
+    return own, driven * over[::-1, None] + ratio[::-1, None] * fields.other
 
 
-def _other(border):
+def swapped(border):
     """The other beam's column in place of each."""
     return border[:, ::-1]
 
@@ -139,7 +152,7 @@ def _pair_of_nodes(factor, nodes):
 def _pair_with_beams(factor, fields):
     nodes, own, other = fields
     pairs = range(own.shape[1])
-    border = total([_other(nodes)[:, :, k] * own[:, k] for k in pairs])
+    border = total([swapped(nodes)[:, :, k] * own[:, k] for k in pairs])
     diagonal = total([other[::-1, k] * own[:, k] for k in pairs])
     corner = total([own[:1, k] * own[1:, k] for k in pairs])
     return factor * border, factor * diagonal, factor * corner
@@ -159,35 +172,28 @@ class Side(NamedTuple):
 def side(quotient: Action, x: Bordered) -> Side:
     """Apply a quotient to one side of a cotangent."""
     core, border = side_of_nodes(quotient.core, quotient.border, x.core, x.border, x.corner)
-    return Side(core, border, _side_of_beams(*quotient[2:], x.border, x.diagonal, x.corner, border))
+    return Side(core, border, side_of_beams(*quotient[2:], edge(x), border))
 
 
 @fenced
 def side_of_nodes(left, sent, core, border, corner):
     """Core and border of a cotangent with a matrix on one side."""
-    return product(left, core), product(left, border) + _other(sent) * corner
+    return product(left, core), product(left, border) + swapped(sent) * corner
 
 
 @fenced
-def _side_of_beams(ratio, right, middle, border, diagonal, corner, driven):
-    beams = total(right.border * border - middle.border * driven)
-    beams = beams + (right.corner - middle.corner * ratio[::-1]) * corner
-    return beams / middle.diagonal + ratio * diagonal
+def side_of_beams(ratio, over, right, middle, x, driven):
+    """Diagonal of the same, from the border."""
+    beams = total(right.border * x.border - middle.border * driven)
+    beams = beams + (right.corner - middle.corner * ratio[::-1]) * x.corner
+    return beams * over + ratio * x.diagonal
 
 
 def both_sides(core, border, sent, corner, left):
     """Core with a quotient on both sides, inside a kernel, from that with it on one."""
     nodes = product(core, transpose(left))
-    border = border - 0.5 * corner * _other(sent)
+    border = border - 0.5 * corner * swapped(sent)
     return nodes + 0.5 * (product(border, transpose(sent)) + product(sent, transpose(border)))
-
-
-def total(terms):
-    """Sum over the first axis, inside a kernel, which a reduction would cut in two."""
-    result = terms[0]
-    for k in range(1, len(terms)):
-        result = result + terms[k]
-    return result
 
 
 def symmetric(x):

@@ -24,9 +24,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._numerics import matmul, weighted_sum
-from .bordered import Bordered, minus_quotient
+from .bordered import Bordered, combined
 from .legendre import associated_legendre
 from .quadrature import double_gauss
+from .quotient import minus_quotient
 
 
 class ModeKernels(eqx.Module):
@@ -78,13 +79,13 @@ def layer_matrix(
     """
     num_nodes = kernels.nodes.shape[0]
     mu = jnp.asarray(double_gauss(2 * num_nodes)[0], moments.dtype)
-    inverse_mu = jnp.diag(1 / mu).reshape(num_nodes, num_nodes, *(1,) * (moments.ndim - 1))
-    core = inverse_mu - weighted_sum(kernels.pairs, moments)
-    weighted = jnp.swapaxes(moments * kernels.beams, 0, 1)
-    border = -weighted_sum(kernels.nodes, weighted)
+    minus = -moments
+    core = weighted_sum(kernels.pairs, minus, jnp.diag(1 / mu))
+    weighted = jnp.swapaxes(minus * kernels.beams, 0, 1)
+    border = weighted_sum(kernels.nodes, weighted)
     corner = jnp.zeros_like(secants[1:])
     if single_scattering:
-        corner = -jnp.sum(moments * kernels.beams[0] * kernels.beams[1:], axis=1)
+        corner = jnp.sum(minus * kernels.beams[0] * kernels.beams[1:], axis=1)
     return Bordered(core, border, secants, corner)
 
 
@@ -142,13 +143,13 @@ def half_layer(
     h = tau * (0.5 / 2**num_doublings)
     square = h * h
     start = start_coefficient(num_doublings)
-    inner = 5.0 * b_inverse + start * square * a
+    inner = combined([5.0, start * square], [b_inverse, a])
     fraction = minus_quotient([(1 / 3, a)], square / 9, a, inner, a)
-    impedance = b_inverse + square * fraction
+    impedance = combined([1.0, square], [b_inverse, fraction])
     admittance = minus_quotient([(h, a)], h * square, a, impedance, fraction)
 
     for _ in range(num_doublings):
-        impedance = impedance + h * admittance
+        impedance = combined([1.0, h], [impedance, admittance])
         admittance = minus_quotient([(2.0, admittance)], 2 * h, admittance, impedance, admittance)
         h = 2 * h
     return admittance, impedance

@@ -1,17 +1,16 @@
 """One layer on the way up, which keeps what the way down needs, and on the way down."""
 
-from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import fenced, product, weighted
-from .bordered import Bordered, Quotient, minus_and_quotient
-from .fields import Action, Edge, Fields, act, advance, edge, pair, split
+from .._numerics import fenced
+from .bordered import Bordered, combined, reciprocal
+from .fields import Action, Feed, Fields, act, advance, feed, pair, split
 from .layer import ModeKernels, conservative, layer_matrix, start_coefficient
 from .pull_back import undo_inverse, undo_start, undouble
+from .quotient import Quotient, minus_and_quotient
 
 # Doublings undone by fields: matrices are as fast with few nodes, and faster than many fields.
 _BY_FIELDS, _BY_FIELDS_OF_FEW, _FEW_NODES = 2, 1, 3
@@ -45,21 +44,21 @@ class Layer(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A quotient's nodes, and what nodes and corner of its right do to beams."""
+    """A quotient's core and border: in blocks of rows on the way up, as arrays on the way down."""
 
-    core: Float[Array, "node node *batch"]
-    border: Float[Array, "node beam *batch"]
+    core: Any
+    border: Any
 
 
 class Kept(NamedTuple):
     """What the way down needs of a layer; diagonals inside it are formed again."""
 
     b_inverse: Bordered
-    a: Edge
-    fraction: Edge
+    a: Feed
+    fraction: Feed
     inner: _Part
     by_a: _Part
-    admittances: list[Edge]
+    admittances: list[Feed]
     doublings: list[_Part]
     adding: Action
 
@@ -68,37 +67,36 @@ def _part(quotient: Quotient) -> _Part:
     return _Part(quotient.core, quotient.border)
 
 
-def _open_edge(matrix: Bordered) -> Edge:
-    return Edge(matrix.border, None, matrix.corner)
-
-
 def climb(
     stack: Bordered, a: Bordered, p: Bordered, tau: Float[Array, "*batch"], num_doublings: int
 ) -> tuple[Bordered, Kept]:
     """Put a layer of A and p = B^-1 on a stack: `layer.half_layer` and `adding.add_layer`."""
     h = tau * (0.5 / 2**num_doublings)
     square = h * h
-    inner = _combined([5.0, start_coefficient(num_doublings) * square], [p, a])
+    inner = combined([5.0, start_coefficient(num_doublings) * square], [p, a])
     fraction, inner = minus_and_quotient([(1 / 3, a)], square / 9, a, inner, a)
-    z = _combined([1.0, square], [p, fraction])
-    # A Z^-1 C from the other side, whose quotient gives that by C with one product (`_chained`).
+    z = combined([1.0, square], [p, fraction])
+    # A Z^-1 C from the other side, whose quotient gives that by C by another (`undo_start`).
     y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a)
     admittances, doublings = [], []
     for _ in range(num_doublings):
-        z = _combined([1.0, h], [z, y])
-        admittances.append(_open_edge(y))
+        z = combined([1.0, h], [z, y])
+        admittances.append(feed(y))
         y, quotient = minus_and_quotient([(2.0, y)], 2 * h, y, z, y)
         doublings.append(_part(quotient))
         h = 2 * h
-    total = _combined([1.0, 1.0], [stack, y])
-    middle = _combined([h, 0.5, 0.5 * h], [stack, z, y])
+    total = combined([1.0, 1.0], [stack, y])
+    middle = combined([h, 0.5, 0.5 * h], [stack, z, y])
     stack, quotient = minus_and_quotient([(1.0, total), (1.0, y)], h, total, middle, total)
     stack = Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
-    adding = Action(quotient.core, quotient.border, quotient.ratio, edge(total), edge(middle))
+    part = _part(quotient)
+    adding = Action(
+        part.core, part.border, quotient.ratio, quotient.over, feed(total), feed(middle)
+    )
     kept = Kept(
         p,
-        _open_edge(a),
-        _open_edge(fraction),
+        feed(a),
+        feed(fraction),
         _part(inner),
         _part(by_a),
         admittances,
@@ -108,55 +106,58 @@ def climb(
     return stack, kept
 
 
-@fenced
-def _combined(weights, matrices):
-    """Weighted sum, in one kernel."""
-    sums = [
-        weighted(list(zip(weights, x, strict=True)))
-        for x in zip(*map(jax.tree.leaves, matrices), strict=True)
-    ]
-    return jax.tree.unflatten(jax.tree.structure(matrices[0]), sums)
+class _Beams(NamedTuple):
+    """Beams' own entries of a layer's quotients: of right over middle, and 1 over the middle.
+
+    Of V, U and W of the start, then of each doubling.
+    """
+
+    ratios: list[Float[Array, "beam *batch"]]
+    overs: list[Float[Array, "beam *batch"]]
+
+
+def _own_beams(a, p, h, num_doublings: int) -> _Beams:
+    """As on the way up; the doublings are those of numbers."""
+    square = h * h
+    over = reciprocal(_inner_middle(p, a, start_coefficient(num_doublings) * square))
+    fraction, ratio = _fraction(a, over, square / 9)
+    z = _sum(p, square, fraction)
+    overs = [over, reciprocal(z)]
+    ratios = [ratio, *_times(overs[1], a, fraction)]
+    y = _less(h, a, h * square, a, ratios[2])
+    for k in range(num_doublings):
+        step = h * 2.0**k
+        z = _sum(z, step, y)
+        overs.append(reciprocal(z))
+        ratios += _times(overs[-1], y)
+        y = _less(2.0, y, 2 * step, y, ratios[-1])
+    return _Beams(ratios, [over, overs[1], *overs[1:]])
 
 
 @fenced
-def _chained(square, by_a, inner, ratio):
-    """Z^-1 C from U = Z^-1 A and V, with C = A (1/3 - (h^2 / 9) V)."""
-    ninth = square / 9
-    core = by_a.core / 3 - ninth * product(by_a.core, inner.core)
-    passed = product(by_a.core, inner.border) + by_a.border * ratio
-    return core, by_a.border / 3 - ninth * passed
-
-
-class _Diagonals(NamedTuple):
-    a: Array
-    fraction: Array
-    inner: Array
-    z: list[Array]
-    admittances: list[Array]
-
-
-def _diagonals(secants, h, num_doublings: int) -> _Diagonals:
-    """Beams' own entries of a layer's matrices, as on the way up."""
-    a, p, square = secants, 1 / secants, h * h
-    inner = 5.0 * p + start_coefficient(num_doublings) * square * a
-    fraction = a / 3 - square / 9 * (a * (a / inner))
-    zs, ys = [p + square * fraction], []
-    y = h * a - h * square * (a * (fraction / zs[0]))
-    for _ in range(num_doublings):
-        ys.append(y)
-        zs.append(zs[-1] + h * y)
-        y = 2.0 * y - 2 * h * (y * (y / zs[-1]))
-        h = 2 * h
-    return _Diagonals(a, fraction, inner, zs, ys)
-
-
-def _quotient(part: _Part, right: Edge, middle: Edge) -> Action:
-    return Action(*part, _ratio(right.diagonal, middle.diagonal), right, middle)
+def _inner_middle(p, a, weight):
+    return 5.0 * p + weight * a
 
 
 @fenced
-def _ratio(right, middle):
-    return right / middle
+def _fraction(a, over, ninth):
+    ratio = a * over
+    return a / 3 - ninth * (a * ratio), ratio
+
+
+@fenced
+def _sum(x, weight, y):
+    return x + weight * y
+
+
+@fenced
+def _times(over, *rights):
+    return [x * over for x in rights]
+
+
+@fenced
+def _less(weight, x, factor, y, ratio):
+    return weight * x - factor * (y * ratio)
 
 
 def descend(
@@ -173,22 +174,17 @@ def descend(
 
     start = tau * (0.5 / 2**num_doublings)
     square = start * start
-    own = fenced(partial(_diagonals, num_doublings=num_doublings))(secants, start)
-    p = kept.b_inverse.border, kept.b_inverse.corner
-    a, fraction = kept.a._replace(diagonal=own.a), kept.fraction._replace(diagonal=own.fraction)
-    admittances = [
-        y._replace(diagonal=d) for y, d in zip(kept.admittances, own.admittances, strict=True)
-    ]
-    without = [_combined([1.0, square], [p, (fraction.border, fraction.corner)])]
-    for k, y in enumerate(admittances):
-        without.append(_combined([1.0, start * 2.0**k], [without[-1], (y.border, y.corner)]))
-    z = [Edge(x, d, c) for (x, c), d in zip(without, own.z, strict=True)]
-    border, corner = _combined(
-        [5.0, start_coefficient(num_doublings) * square], [p, (a.border, a.corner)]
-    )
-    inner = Edge(border, own.inner, corner)
+    own = _own_beams(secants, kept.b_inverse.diagonal, start, num_doublings)
+    p = feed(kept.b_inverse)
+    z = [combined([1.0, square], [p, kept.fraction])]
+    for k, y in enumerate(kept.admittances):
+        z.append(combined([1.0, start * 2.0**k], [z[-1], y]))
+    inner = combined([5.0, start_coefficient(num_doublings) * square], [p, kept.a])
     quotients = [
-        _quotient(r, y, s) for r, y, s in zip(kept.doublings, admittances, z[1:], strict=True)
+        Action(part.core, part.border, ratio, over, y, middle)
+        for part, ratio, over, y, middle in zip(
+            kept.doublings, own.ratios[3:], own.overs[3:], kept.admittances, z[1:], strict=True
+        )
     ]
 
     nodes = fields.nodes.shape[0]
@@ -198,13 +194,11 @@ def descend(
     y_bar, z_bar = pair(2.0, mean), pair(0.5, drop)
     for k in reversed(range(num_doublings - by_fields)):
         y_bar, z_bar = undouble(quotients[k], start * 2.0**k, y_bar, z_bar)
-    by_inner = _quotient(kept.inner, a, inner)
-    by_a = _quotient(kept.by_a, a, z[0])
-    by_fraction = _Part(*_chained(square, kept.by_a, kept.inner, by_inner.ratio))
     a_bar, p_bar = undo_start(
-        by_inner,
-        by_a,
-        _quotient(by_fraction, fraction, z[0]),
+        Action(*kept.inner, own.ratios[0], own.overs[0], kept.a, inner),
+        Action(*kept.by_a, own.ratios[1], own.overs[1], kept.a, z[0]),
+        own.ratios[2],
+        kept.fraction,
         square,
         start_coefficient(num_doublings),
         y_bar,

@@ -36,7 +36,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._kernels import one_kernel
-from .._numerics import fenced, matmul
+from .._numerics import Rows, fenced, matmul
 from .adding import top
 from .bordered import Bordered
 from .fields import Fields, pair
@@ -89,7 +89,7 @@ def mode_slopes(
 
     def put_on_and_keep(stack, kept, layers, number, kernels, view_secant):
         stack, new = put_on(stack, _one_of(layers, number), kernels, view_secant)
-        return stack, _with_one(kept, number, jax.tree.map(jnp.ravel, new))
+        return stack, jax.tree.map(partial(_in_row, number), kept, new)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
 
@@ -97,7 +97,11 @@ def mode_slopes(
         return put_one(*carry, layers, number, kernels, view_secant), None
 
     first = _one_of(layers, 0)
-    shapes = jax.eval_shape(lambda: put_on(ground, first, kernels, view_secant)[1])
+    shapes = jax.eval_shape(
+        lambda: jax.tree.map(
+            _joined, put_on(ground, first, kernels, view_secant)[1], is_leaf=_in_blocks
+        )
+    )
     if kept is None:
         kept = jax.tree.map(lambda x: jnp.zeros((numbers.size, x.size), x.dtype), shapes)
     (stack, kept), _ = jax.lax.scan(up, (ground, kept), numbers, reverse=True)
@@ -146,6 +150,31 @@ def _with_one(stacks: Any, number: Any, new: Any) -> Any:
     """The same arrays with `new` in place of that."""
     write = partial(jax.lax.dynamic_update_index_in_dim, index=_integer(number), axis=0)
     return jax.tree.map(write, stacks, new)
+
+
+def _in_blocks(x: Any) -> bool:
+    return isinstance(x, Rows)
+
+
+def _joined(x: Any) -> Array:
+    return x.joined() if isinstance(x, Rows) else x
+
+
+def _in_row(number: Any, rows: Array, new: Any) -> Array:
+    """The array with `new` in that row; a matrix in blocks is put together on the way."""
+    start = 0
+    for block in new.blocks if isinstance(new, Rows) else (new,):
+        rows = _put(rows, block.reshape(-1), number, start)
+        start += block.size
+    return rows
+
+
+def _put(rows, part, number, start):
+    @fenced
+    def put(rows, part, number):
+        return jax.lax.dynamic_update_slice(rows, part[None], (_integer(number), jnp.int32(start)))
+
+    return put(rows, part, number)
 
 
 def _integer(number):

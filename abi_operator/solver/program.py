@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._numerics import fenced
 from .adding import Emission, Top, emitting_ground
 from .adjoint import ModeSum, mode_sum
 from .azimuth import (
@@ -186,4 +187,8 @@ def _brf(problem: _Problem, reflection: Float[Array, "view *batch"]) -> Float[Ar
         angle = cos_scattering_angle(mu0, mu, column.relative_azimuth)
         exact = legendre_series(problem.moments, angle)
     ratio = layers.scattering_ratio
-    return brf + exact_single_scattering(layers.tau, ratio, exact, mu0, mu, sun)
+    return brf + _scattered_once(layers.tau, ratio, exact, mu0, mu, sun)
+
+
+# Else XLA would compute it column by column, where the result is turned to have the batch first.
+_scattered_once = fenced(exact_single_scattering)

@@ -11,9 +11,21 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._numerics import fenced, product, transpose
+from .._numerics import fenced, product, total, transpose
 from .bordered import Bordered
-from .fields import Action, Edge, both_sides, edge, side, side_of_nodes, symmetric, total
+from .fields import (
+    Action,
+    Edge,
+    Feed,
+    Side,
+    both_sides,
+    edge,
+    side,
+    side_of_beams,
+    side_of_nodes,
+    swapped,
+    symmetric,
+)
 from .layer import ModeKernels
 from .quadrature import double_gauss
 
@@ -67,18 +79,27 @@ def _undouble_edges(h, ratio, border, diagonal, y_bar, z_bar):
 def undo_start(
     inner: Action,
     by_a: Action,
-    by_fraction: Action,
+    ratio_w: Float[Array, "2 *batch"],
+    fraction: Feed,
     square: Float[Array, "*batch"],
     d: float,
     y_bar: Bordered,
     z_bar: Bordered,
 ) -> tuple[Bordered, Bordered]:
-    """Cotangents of A and of B^-1 over h from P and Q, by V, U, W and the start's d."""
-    u, w = side(by_a, y_bar), side(by_fraction, y_bar)
-    mixed = _mixed_core(u, w, by_a.border, by_fraction.border, by_fraction.core, y_bar.corner)
+    """Cotangents of A and of B^-1 over h from P and Q, by V, U, W and the start's d.
+
+    W = U (1/3 - h^2 V / 9), and the two commute: W's products follow from U's by one with V.
+    """
+    u = side(by_a, y_bar)
+    sent_w, w_core, w_border = _chained(
+        square / 9, inner.core, inner.border, inner.ratio, by_a.core, by_a.border, u, y_bar.corner
+    )
+    w_diagonal = side_of_beams(ratio_w, by_a.over, fraction, by_a.middle, edge(y_bar), w_border)
+    w = Side(w_core, w_border, w_diagonal)
+    mixed = _mixed_core(u, w, by_a.border, sent_w, by_a.core, y_bar.corner)
     z_core = _start_z_core(square, z_bar.core, u.core, y_bar.border, by_a.border, mixed)
     z_edge, p_edge = _start_z_edge(
-        square, u[1:], w[1:], by_a.ratio, by_fraction.ratio, edge(y_bar), edge(z_bar)
+        square, u[1:], w[1:], by_a.ratio, ratio_w, edge(y_bar), edge(z_bar)
     )
     z = Bordered(z_core, *z_edge)
     v = side(inner, z)
@@ -89,7 +110,7 @@ def undo_start(
         y_bar.core,
         y_bar.border,
         w.core,
-        by_fraction.border,
+        sent_w,
         z.core,
         z.border,
         v.core,
@@ -99,16 +120,25 @@ def undo_start(
         mixed,
     )
     a_edge, p_edge = _start_edges(
-        square, d, edge(y_bar), w[1:], by_fraction.ratio, edge(z), v[1:], inner.ratio, p_edge
+        square, d, edge(y_bar), w[1:], ratio_w, edge(z), v[1:], inner.ratio, p_edge
     )
     return Bordered(a_core, *a_edge), Bordered(p_core, *p_edge)
 
 
 @fenced
-def _mixed_core(u, w, sent_u, sent_w, left_w, corner):
-    nodes = product(u.core, transpose(left_w))
-    from_u = u.border - 0.5 * corner * sent_u[:, ::-1]
-    from_w = w.border - 0.5 * corner * sent_w[:, ::-1]
+def _chained(ninth, v, sent_v, ratio_v, u, sent_u, by_u, corner):
+    """What W sends, and its products from those of U."""
+    sent = sent_u / 3 - ninth * (product(u, sent_v) + sent_u * ratio_v)
+    nodes = by_u.border - swapped(sent_u) * corner
+    border = nodes / 3 - ninth * product(v, nodes) + swapped(sent) * corner
+    return sent, by_u.core / 3 - ninth * product(v, by_u.core), border
+
+
+@fenced
+def _mixed_core(u, w, sent_u, sent_w, left_u, corner):
+    nodes = product(w.core, transpose(left_u))
+    from_u = u.border - 0.5 * corner * swapped(sent_u)
+    from_w = w.border - 0.5 * corner * swapped(sent_w)
     rows = product(from_u, transpose(sent_w)) + product(from_w, transpose(sent_u))
     return nodes + 0.5 * rows
 

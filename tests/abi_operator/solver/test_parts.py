@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from abi_operator._batching import map_tiles
-from abi_operator._numerics import inverse, matmul, safe_divide, safe_sqrt
+from abi_operator._elimination import inverse, solve
+from abi_operator._numerics import matmul, safe_divide, safe_sqrt
 from abi_operator.solver import double_gauss, sufficient_doublings
-from abi_operator.solver.bordered import Bordered, Vector, minus_and_quotient, minus_quotient
+from abi_operator.solver.bordered import Bordered, Vector
 from abi_operator.solver.delta_m import delta_m
 from abi_operator.solver.doublings import _REACH, unknown_doublings
 from abi_operator.solver.layer import half_layer
 from abi_operator.solver.legendre import associated_legendre, legendre_series
+from abi_operator.solver.quotient import minus_and_quotient, minus_quotient
 
 REACH_ERROR = 2e-12  # what `doublings` promises, and rounding
 
@@ -150,6 +152,28 @@ def test_inverse_of_positive_definite_matrices(n):
     a = jnp.asarray(np.einsum("ikb,jkb->ijb", root, root)) + jnp.eye(n)[..., None]
     identity = np.broadcast_to(np.eye(n)[..., None], a.shape)
     np.testing.assert_allclose(matmul(a, inverse(a)), identity, atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 6, 8, 12])
+def test_quotients_of_positive_definite_matrices(n):
+    """By halves of halves, and their derivative, which is written out, against differences."""
+    rng = np.random.default_rng(n)
+    root, change = rng.normal(size=(2, n, n, 7))
+    a = jnp.asarray(np.einsum("ikb,jkb->ijb", root, root)) + jnp.eye(n)[..., None]
+    rights = [jnp.asarray(rng.normal(size=(n, columns, 7))) for columns in (n, 2)]
+    found = [x.joined() for x in solve(a, rights)]
+    for x, right in zip(found, rights, strict=True):
+        np.testing.assert_allclose(matmul(a, x), right, atol=1e-11)
+
+    da = jnp.asarray(change + np.swapaxes(change, 0, 1))
+
+    def along(step):
+        return [x.joined() for x in solve(a + step * da, [r * (1 + step) for r in rights])]
+
+    slopes = jax.jvp(along, (0.0,), (1.0,))[1]
+    for slope, above, below in zip(slopes, along(1e-5), along(-1e-5), strict=True):
+        scale = np.abs(slope).max()  # differences of 1e-5 are right to 1e-10 of what they divide
+        np.testing.assert_allclose(slope, (above - below) / 2e-5, atol=1e-6 * scale)
 
 
 def test_map_tiles_fills_up_the_last_tile():
