@@ -86,16 +86,20 @@ def solve(
     By halves and their halves, so that no inverse of more than two rows is put together, which
     takes as much time in copies as in arithmetic. The derivative is written out, as `inverse`'s.
     """
-    return [_substituted(_factors(a), right) for right in rights]
+    return _quotients(_factors(a), rights)
+
+
+def _quotients(factors, rights) -> list[Rows]:
+    return [_substituted(factors, right) for right in rights]
 
 
 @solve.defjvp
 def _solve_jvp(primals, tangents):
     (a, rights), (da, drights) = primals, tangents
     factors = _factors(a)
-    found = [_substituted(factors, right) for right in rights]
+    found = _quotients(factors, rights)
     changes = [d - matmul(da, x) for d, x in zip(drights, found, strict=True)]
-    return found, [_substituted(factors, change) for change in changes]
+    return found, _quotients(factors, changes)
 
 
 class _Factors(NamedTuple):
