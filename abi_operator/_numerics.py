@@ -82,22 +82,20 @@ def product(
     if inner > _WRITTEN_OUT:
         b = b.joined() if isinstance(b, Rows) else b
         return jnp.einsum("ik...,kj...->ij...", a, b, precision=jax.lax.Precision.HIGHEST)
-    columns = [a[:, k, None] for k in range(inner)]
-    rows = [block[None, k] for block in _blocks(b) for k in range(block.shape[0])]
     if inner in _IN_PARTS and a.dtype == jnp.float32:
-        half = inner // 2
-        first = _sum_of_products(columns[:half], rows[:half])
-        return total([first, *(x * y for x, y in zip(columns[half:], rows[half:], strict=True))])
-    return total([x * y for x, y in zip(columns, rows, strict=True)])
+        return total([_first_half(a, b), *_terms(a, b)[inner // 2 :]])
+    return total(_terms(a, b))
 
 
-def _blocks(b):
-    return b.blocks if isinstance(b, Rows) else (b,)
+def _terms(a, b):
+    blocks = b.blocks if isinstance(b, Rows) else (b,)
+    rows = [block[k] for block in blocks for k in range(block.shape[0])]
+    return [a[:, k, None] * row[None] for k, row in enumerate(rows)]
 
 
 @fenced
-def _sum_of_products(columns, rows):
-    return total([x * y for x, y in zip(columns, rows, strict=True)])
+def _first_half(a, b):
+    return total(_terms(a, b)[: a.shape[1] // 2])
 
 
 def kernel_of_product(function: Callable, inner: int) -> Callable:

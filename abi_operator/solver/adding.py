@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._elimination import inverse, solve
-from .._numerics import matmul
+from .._numerics import matmul, total
 from .bordered import Bordered, Vector, combined
 from .quotient import minus_and_quotient, minus_quotient
 
@@ -63,9 +63,9 @@ def add_layer(
     :math:`Y \leftarrow Y + 2Y_e - h(Y + Y_e)S^{-1}(Y + Y_e)`.
     The beams' own entries of Y are 1 whatever lies below, and are set so.
     """
-    h, total, middle = _sums(stack, admittance, impedance, tau)
-    base = [(1.0, total), (1.0, admittance)]
-    return _with_own_beams(minus_quotient(base, h, total, middle, total))
+    h, both, middle = _sums(stack, admittance, impedance, tau)
+    base = [(1.0, both), (1.0, admittance)]
+    return _with_own_beams(minus_quotient(base, h, both, middle, both))
 
 
 def add_emitting_layer(
@@ -81,23 +81,23 @@ def add_emitting_layer(
     As `add_layer`, and :math:`e \leftarrow e - (Y + Y_e)S^{-1}(he - j)` with the layer's own
     :math:`j = (B_{bottom} - B_{top}) B^{-1} 1`, None for air that does not emit.
     """
-    h, total, middle = _sums(stack, admittance, impedance, tau)
-    base = [(1.0, total), (1.0, admittance)]
-    added, quotient = minus_and_quotient(base, h, total, middle, total)
+    h, both, middle = _sums(stack, admittance, impedance, tau)
+    base = [(1.0, both), (1.0, admittance)]
+    added, quotient = minus_and_quotient(base, h, both, middle, both)
     driving = h * emission.column
     if jump is not None:
         driving = driving - jump
     column = emission.column - quotient.transposed_action(driving)
     solved = solve(middle.core, [emission.column.nodes[:, None]])[0].joined()[:, 0]
-    returned = emission.returned + h * jnp.sum(emission.column.nodes * solved, axis=0)
+    returned = emission.returned + h * total(emission.column.nodes * solved)
     return _with_own_beams(added), Emission(column, returned)
 
 
 def _sums(stack, admittance, impedance, tau):
     """h, Y + Y_e and S."""
     h = 0.5 * tau
-    total = combined([1.0, 1.0], [stack, admittance])
-    return h, total, combined([h, 0.5, 0.5 * h], [stack, impedance, admittance])
+    both = combined([1.0, 1.0], [stack, admittance])
+    return h, both, combined([h, 0.5, 0.5 * h], [stack, impedance, admittance])
 
 
 def _with_own_beams(stack: Bordered) -> Bordered:

@@ -18,8 +18,8 @@ from .azimuth import mode_kernels
 from .bordered import Bordered
 from .ground import black
 from .layer import half_layer, node_functions
-from .layer_adjoint import Layer
-from .mode_slopes import Kernels, Slopes, mode_slopes
+from .layer_adjoint import Layers
+from .mode_slopes import Kernels, Shared, mode_slopes
 
 _WHOLE = 2  # nodes up to which all layers of all modes are one kernel
 
@@ -75,24 +75,29 @@ def _reflectance(
 ) -> Float[Array, "*batch"]:
     modes = _Modes(inputs)
 
-    def put_on(stack, layer, kernels, view_secant):
+    def put_on(stack, layers, odd, kernels, view_secant, *number):
+        # Of a layer that is the only one XLA would find no use for the number (see `one_kernel`).
+        layer = layers.layer(number[0] if number else jnp.zeros_like(odd), odd)
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return add_layer(stack, *half_layer(a, p, layer.tau, num_doublings), layer.tau)
 
     put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
 
-    def reflection(layers, kernels, ground):
-        def add(stack, layer):
-            return put_on(stack, layer, kernels, inputs.view_secant), None
+    def reflection(layers, odd, kernels, ground):
+        def add(stack, *number):
+            return put_on(stack, layers, odd, kernels, inputs.view_secant, *number), None
 
-        stack, _ = jax.lax.scan(add, ground, layers, reverse=True)
+        numbers = jnp.arange(layers.tau.shape[0], dtype=layers.tau.dtype)
+        if numbers.size == 1:
+            stack, _ = add(ground)
+        else:
+            stack, _ = jax.lax.scan(add, ground, numbers, reverse=True)
         return top(stack).reflection()[0]
 
     def step(total, mode):
-        return total + mode.weight * reflection(*modes.seen_by(mode)), None
+        return total + mode.weight * reflection(modes.layers, *modes.seen_by(mode)), None
 
-    first = modes.first()
-    value = inputs.weights[0] * reflection(modes.layers_of_the_mean(), *first)
+    value = inputs.weights[0] * reflection(modes.layers_of_the_mean, *modes.first())
     return jax.lax.scan(step, value, modes.others())[0]
 
 
@@ -114,36 +119,43 @@ def reflectance_and_gradient(
     Each column's slope is that of its own value. Slopes in the ground's cores are symmetric.
     """
     modes = _Modes(inputs)
-    solve = partial(mode_slopes, inputs.view_secant, num_doublings, single_scattering)
-    first, kept, mean = solve(modes.layers_of_the_mean(), *modes.first(), inputs.weights[0], None)
-    value = inputs.weights[0] * first
+
+    def solve(layers, odd, kernels, ground, weight, slopes, kept):
+        shared, how = Shared(layers, inputs.view_secant), (num_doublings, single_scattering)
+        return mode_slopes(shared, *how, odd, kernels, ground, weight, slopes, kept)
+
+    layers = modes.layers_of_the_mean
+    nothing = jax.tree.map(jnp.zeros_like, Shared(layers, inputs.view_secant))
+    first, kept, mean = solve(layers, *modes.first(), inputs.weights[0], nothing, None)
+    coalbedo = mean.shared.layers.coalbedo
+    assert coalbedo is not None  # mode 0 depends on it
 
     def step(carry, mode):
-        value, common, kept = carry
-        reflection, kept, slopes = solve(*modes.seen_by(mode), mode.weight, kept)
-        common = jax.tree.map(jnp.add, common, modes.common(slopes, mode.odd))
+        value, shared, kept = carry
+        reflection, kept, slopes = solve(
+            modes.layers, *modes.seen_by(mode), mode.weight, shared, kept
+        )
         ground = None if mode.ground is None else slopes.ground
         return (
-            (value + mode.weight * reflection, common, kept),
+            (value + mode.weight * reflection, slopes.shared, kept),
             (reflection, (slopes.even_beams, slopes.odd_beams), ground),
         )
 
-    carry = value, modes.common(mean, jnp.asarray(False)), kept
-    (value, common, _), (reflections, beams, grounds) = jax.lax.scan(step, carry, modes.others())
-    tau, sun_secants, moments, view_secant = common
-
-    coalbedo = mean.layers.coalbedo
-    assert coalbedo is not None  # mode 0 depends on it
+    shared = mean.shared._replace(layers=mean.shared.layers._replace(coalbedo=None))
+    carry = inputs.weights[0] * first, shared, kept
+    (value, shared, _), (reflections, beams, grounds) = jax.lax.scan(step, carry, modes.others())
+    summed = shared.layers
+    moments = summed.moments.reshape(2, -1, *summed.moments.shape[1:])
 
     def joined(one, more):
         return jnp.concatenate([one[None], more])
 
     even_beams, odd_beams = map(joined, (mean.even_beams, mean.odd_beams), beams)
     gradient = ModeSum(
-        tau=tau,
+        tau=summed.tau,
         coalbedo=coalbedo,
-        sun_secants=sun_secants,
-        view_secant=view_secant,
+        sun_secants=summed.sun_secant,
+        view_secant=shared.view_secant,
         moments=(moments[0], moments[1]),
         beams=(even_beams, odd_beams),
         ground=mean.ground,
@@ -156,7 +168,7 @@ def reflectance_and_gradient(
 class _Mode(NamedTuple):
     """Of a mode above 0."""
 
-    odd: Array
+    odd: Float[Array, ""]
     weight: Float[Array, "*batch"]
     ground: Bordered | None
     nodes: tuple[Array, Array]
@@ -168,7 +180,10 @@ class _Modes:
 
     def __init__(self, inputs: ModeSum):
         even, odd = inputs.moments
-        self.inputs, self.moments = inputs, jnp.stack([even, odd])
+        self.inputs = inputs
+        both = jnp.concatenate([even, odd])
+        self.layers = Layers(inputs.tau, None, inputs.sun_secants, both)
+        self.layers_of_the_mean = self.layers._replace(coalbedo=inputs.coalbedo)
         self.num_nodes = even.shape[1]
         self.num_streams = 2 * self.num_nodes
         num_modes = inputs.weights.shape[0]
@@ -181,38 +196,24 @@ class _Modes:
             for parity in (0, 1)
         )
 
-    def layers_of_the_mean(self) -> Layer:
+    def first(self) -> tuple[Array, Kernels, Bordered]:
+        """Whether it is odd, kernels and ground of mode 0."""
         x = self.inputs
-        return Layer(x.tau, x.coalbedo, x.sun_secants, *x.moments)
-
-    def first(self) -> tuple[Kernels, Bordered]:
-        kernels = _kernels([n[0] for n in self.nodes], [v[0] for v in self.inputs.beams])
-        return kernels, self.inputs.ground
+        kernels = _kernels([n[0] for n in self.nodes], [v[0] for v in x.beams])
+        return jnp.zeros((), x.tau.dtype), kernels, x.ground
 
     def others(self) -> _Mode:
         x = self.inputs
-        odd = jnp.arange(1, x.weights.shape[0]) % 2 == 1
+        odd = jnp.arange(1, x.weights.shape[0], dtype=x.tau.dtype) % 2
         later = jax.tree.map(lambda table: table[1:], (self.nodes, x.beams))
         return _Mode(odd, x.weights[1:], x.grounds, *later)
 
-    def seen_by(self, mode: _Mode) -> tuple[Layer, Kernels, Bordered]:
-        """Layers, kernels and ground of a mode above 0."""
-        x, moments = self.inputs, _ordered(self.moments, mode.odd)
+    def seen_by(self, mode: _Mode) -> tuple[Array, Kernels, Bordered]:
+        """The same of a mode above 0."""
         ground = mode.ground
         if ground is None:
-            ground = black(jnp.ones_like(x.ground.diagonal), self.num_streams)
-        layers = Layer(x.tau, None, x.sun_secants, moments[0], moments[1])
-        return layers, _kernels(mode.nodes, mode.beams), ground
-
-    def common(self, slopes: Slopes, odd: Array) -> tuple[Array, Array, Array, Array]:
-        """Slopes in what all modes share; moments of even degree first."""
-        layers = slopes.layers
-        moments = _ordered(jnp.stack([layers.even, layers.odd]), odd)
-        return layers.tau, layers.sun_secant, moments, slopes.view_secant
-
-
-def _ordered(moments, odd):
-    return jnp.where(odd, moments[::-1], moments)
+            ground = black(jnp.ones_like(self.inputs.ground.diagonal), self.num_streams)
+        return mode.odd, _kernels(mode.nodes, mode.beams), ground
 
 
 def _kernels(nodes, beams) -> Kernels:

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._kernels import one_kernel
 from .adding import Emission, Top, add_emitting_layer, add_layer, top
 from .bordered import Bordered, Vector
 from .delta_m import ScaledLayers
@@ -97,14 +98,14 @@ def azimuthal_mean(
     num_doublings, single_scattering
         See `higher_modes`.
     """
-    half = _half_layers_of_the_mean(tables, directions, num_doublings, single_scattering)
+    how = num_doublings, single_scattering
 
-    def add(stack, layer):
-        _, admittance, impedance = half(layer)
-        return add_layer(stack, admittance, impedance, layer[0]), None
+    def add(stack, layer, kernels, directions):
+        _, admittance, impedance = _half_layer_of_the_mean(layer, kernels, directions, *how)
+        return add_layer(stack, admittance, impedance, layer[0])
 
-    stack, _ = _scan_upwards(add, ground, _properties_of_the_mean(layers, directions))
-    return top(stack)
+    properties = _properties_of_the_mean(layers, directions)
+    return top(_scan_upwards(add, ground, properties, tables.kernels(0), directions))
 
 
 def emitting_mean(
@@ -130,44 +131,47 @@ def emitting_mean(
     planck_jumps
         Increase of the Planck function from top to bottom of each layer; None for cold air.
     """
-    half = _half_layers_of_the_mean(tables, directions, num_doublings, single_scattering)
+    how = num_doublings, single_scattering
 
-    def add(carry, x):
+    def add(carry, x, kernels, directions, one):
         (stack, emission), (layer, planck_jump) = carry, x
-        b_inverse, admittance, impedance = half(layer)
+        b_inverse, admittance, impedance = _half_layer_of_the_mean(layer, kernels, directions, *how)
         jump = None if planck_jump is None else planck_jump * (b_inverse @ one)
-        return add_emitting_layer(stack, emission, admittance, impedance, layer[0], jump), None
+        return add_emitting_layer(stack, emission, admittance, impedance, layer[0], jump)
 
     xs = (_properties_of_the_mean(layers, directions), planck_jumps)
-    (stack, emission), _ = _scan_upwards(add, (ground, emission), xs)
+    shared = tables.kernels(0), directions, one
+    stack, emission = _scan_upwards(add, (ground, emission), xs, *shared)
     return top(stack), emission
 
 
-def _scan_upwards(add: Callable, stack: Any, layers: Any) -> tuple[Any, Any]:
-    """Add the layers from the ground up.
+def _scan_upwards(add: Callable, stack: Any, layers: Any, kernels: Any, *shared: Any) -> Any:
+    """Add the layers from the ground up, each as one kernel.
 
     Reverse mode keeps the stack between layers and computes each layer again: a quarter of the
     time of writing down all that happens in it, and a fraction of the memory.
     """
-    return jax.lax.scan(jax.checkpoint(add), stack, layers, reverse=True)
+    add = one_kernel(add, kernels[0].nodes.shape[0])
+
+    def step(stack, layer):
+        return add(stack, layer, kernels, *shared), None
+
+    return jax.lax.scan(jax.checkpoint(step), stack, layers, reverse=True)[0]
 
 
 def _properties_of_the_mean(layers: ScaledLayers, directions: Directions) -> tuple[Array, ...]:
     return (layers.tau, layers.coalbedo, directions.sun_secants, *weighted_moments(layers))
 
 
-def _half_layers_of_the_mean(tables, directions, num_doublings, single_scattering):
-    kernels_a, kernels_b = tables.kernels(0)
-
-    def half(layer) -> tuple[Bordered, Bordered, Bordered]:
-        tau, coalbedo, sun, moments_a, moments_b = layer
-        secants = directions.secants(sun)
-        a = layer_matrix(kernels_a, moments_a, secants, single_scattering)
-        a = conservative(a, coalbedo)
-        b_inverse = layer_matrix(kernels_b, moments_b, secants, single_scattering).inverse()
-        return b_inverse, *half_layer(a, b_inverse, tau, num_doublings)
-
-    return half
+def _half_layer_of_the_mean(
+    layer, kernels, directions, num_doublings, single_scattering
+) -> tuple[Bordered, Bordered, Bordered]:
+    tau, coalbedo, sun, moments_a, moments_b = layer
+    secants = directions.secants(sun)
+    a = layer_matrix(kernels[0], moments_a, secants, single_scattering)
+    a = conservative(a, coalbedo)
+    b_inverse = layer_matrix(kernels[1], moments_b, secants, single_scattering).inverse()
+    return b_inverse, *half_layer(a, b_inverse, tau, num_doublings)
 
 
 def higher_modes(
@@ -199,22 +203,21 @@ def higher_modes(
     moments = weighted_moments(layers)
     dtype, num_streams = relative_azimuth.dtype, layers.moments.shape[1]
 
+    def add(stack, layer, kernels, directions):
+        tau, sun, moments_a, moments_b = layer
+        secants = directions.secants(sun)
+        a = layer_matrix(kernels[0], moments_a, secants, single_scattering)
+        b_inverse = layer_matrix(kernels[1], moments_b, secants, single_scattering).inverse()
+        admittance, impedance = half_layer(a, b_inverse, tau, num_doublings)
+        return add_layer(stack, admittance, impedance, tau)
+
     def step(total, x):
         m, ground, nodes, beams = x
         if ground is None:
             ground = black(directions.cosines, num_streams)
-        kernels_a, kernels_b = (mode_kernels(n, v) for n, v in zip(nodes, beams, strict=True))
-
-        def add(stack, layer):
-            tau, sun, moments_a, moments_b = layer
-            secants = directions.secants(sun)
-            a = layer_matrix(kernels_a, moments_a, secants, single_scattering)
-            b_inverse = layer_matrix(kernels_b, moments_b, secants, single_scattering).inverse()
-            admittance, impedance = half_layer(a, b_inverse, tau, num_doublings)
-            return add_layer(stack, admittance, impedance, tau), None
-
+        kernels = tuple(mode_kernels(n, v) for n, v in zip(nodes, beams, strict=True))
         xs = (layers.tau, directions.sun_secants, moments[m % 2], moments[1 - m % 2])
-        stack, _ = _scan_upwards(add, ground, xs)
+        stack = _scan_upwards(add, ground, xs, kernels, directions)
         sign = jnp.where(m % 2 == 0, 2, -2).astype(dtype)
         angle = m.astype(dtype) * relative_azimuth
         return total + sign * jnp.cos(angle) * top(stack).reflection(), None

@@ -22,7 +22,6 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._elimination import inverse
@@ -99,7 +98,7 @@ class Bordered(eqx.Module):
 
         The sun's entry of the result is its border taken as a row, as if the sun were a view.
         """
-        to_beams = jnp.sum(self.border * vector.nodes[:, None], axis=0)
+        to_beams = total(self.border * vector.nodes[:, None])
         return Vector(
             matmul(self.core, vector.nodes[:, None])[:, 0],
             to_beams + self.diagonal * vector.beams,

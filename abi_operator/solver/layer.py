@@ -23,7 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._numerics import matmul, weighted_sum
+from .._numerics import matmul, total, weighted_sum
 from .bordered import Bordered, combined
 from .legendre import associated_legendre
 from .quadrature import double_gauss
@@ -85,7 +85,8 @@ def layer_matrix(
     border = weighted_sum(kernels.nodes, weighted)
     corner = jnp.zeros_like(secants[1:])
     if single_scattering:
-        corner = jnp.sum(minus * kernels.beams[0] * kernels.beams[1:], axis=1)
+        both = minus * kernels.beams[0] * kernels.beams[1:]
+        corner = total([both[:, k] for k in range(both.shape[1])])
     return Bordered(core, border, secants, corner)
 
 

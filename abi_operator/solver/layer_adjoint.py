@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -41,6 +42,56 @@ class Layer(NamedTuple):
         if self.coalbedo is not None:
             a = conservative(a, self.coalbedo)
         return a, layer_matrix(kernels[1], self.odd, secants, single_scattering).inverse()
+
+
+class Layers(NamedTuple):
+    """All layers, top first, as every mode sees them.
+
+    Moments of even degrees come first, then those of odd ones: a mode of odd m has them the other
+    way round, and finds them by their place.
+    """
+
+    tau: Float[Array, "layer *batch"]
+    coalbedo: Float[Array, "layer *batch"] | None
+    sun_secant: Float[Array, "layer *batch"]
+    moments: Float[Array, "parity_and_layer degree *batch"]
+
+    def layer(self, number: Array, odd: Array) -> Layer:
+        """One of them. Both arguments are not of integers, which have no tangents in a kernel."""
+        even_place, odd_place = self._places(number, odd)
+        return Layer(
+            read(self.tau, number),
+            None if self.coalbedo is None else read(self.coalbedo, number),
+            read(self.sun_secant, number),
+            read(self.moments, even_place),
+            read(self.moments, odd_place),
+        )
+
+    def plus(self, number: Array, odd: Array, new: Layer) -> "Layers":
+        """The same with `new` added to one of them."""
+        moments = self.moments
+        for place, added in zip(self._places(number, odd), (new.even, new.odd), strict=True):
+            moments = _add(moments, place, added)
+        return Layers(
+            _add(self.tau, number, new.tau),
+            None if new.coalbedo is None else _add(self.coalbedo, number, new.coalbedo),
+            _add(self.sun_secant, number, new.sun_secant),
+            moments,
+        )
+
+    def _places(self, number, odd):
+        count = self.tau.shape[0]
+        return number + count * odd, number + count * (1 - odd)
+
+
+def read(stack: Float[Array, "layer *own"], place: Array) -> Float[Array, "*own"]:
+    """One entry of an array."""
+    return jax.lax.dynamic_index_in_dim(stack, place.astype(jnp.int32), 0, keepdims=False)
+
+
+def _add(stack, place, new):
+    new = read(stack, place) + new
+    return jax.lax.dynamic_update_index_in_dim(stack, new, place.astype(jnp.int32), 0)
 
 
 class _Part(NamedTuple):

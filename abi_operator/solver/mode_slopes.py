@@ -41,41 +41,51 @@ from .adding import top
 from .bordered import Bordered
 from .fields import Fields, pair
 from .layer import ModeKernels
-from .layer_adjoint import Layer, climb, descend
+from .layer_adjoint import Layer, Layers, climb, descend, read
 from .pull_back import MatrixSlopes, undo_matrix
 
 Kernels = tuple[ModeKernels, ModeKernels]
 
 
 class Slopes(NamedTuple):
-    """Of one mode, in what its layers and beams are made of and in its ground."""
+    """Of one mode, in what its beams are made of and in its ground; of it and those before it, in
+    what all share.
+    """
 
-    layers: Layer
+    shared: "Shared"
     even_beams: Float[Array, "2 degree *batch"]
     odd_beams: Float[Array, "2 degree *batch"]
-    view_secant: Float[Array, "*batch"]
     ground: Bordered
 
 
+class Shared(NamedTuple):
+    """What all modes depend on, or slopes in it."""
+
+    layers: Layers
+    view_secant: Float[Array, "*batch"]
+
+
 def mode_slopes(
-    view_secant: Float[Array, "*batch"],
+    shared: Shared,
     num_doublings: int,
     single_scattering: bool,
-    layers: Layer,
+    odd: Float[Array, ""],
     kernels: Kernels,
     ground: Bordered,
     weight: Float[Array, "*batch"],
+    slopes: Shared,
     kept: Any,
 ) -> tuple[Float[Array, "*batch"], Any, Slopes]:
-    """Reflection of a mode, and the slopes of `weight` times it.
+    """Reflection of a mode, and the slopes of `weight` times it, added to those of other modes.
 
-    `kept` is room for what is kept of all layers, given back filled: modes that share it do not
-    clear it, nor copy it, one after the other. Layers are read and written inside the kernels: as
-    inputs and outputs of a scan every array would be one more kernel a layer. Matrices lie in it
-    as one row each: LLVM unrolls a copy of 64 numbers whole, number by number, before it could
-    make vectors of it.
+    `odd` is 1 or 0, as the mode is. `kept` is room for what is kept of all layers, given back
+    filled: modes that share it do not clear it, nor copy it, one after the other. Layers are read
+    and written inside the kernels: as inputs and outputs of a scan every array would be one more
+    kernel a layer. Matrices lie in it as one row each: LLVM unrolls a copy of 64 numbers whole,
+    number by number, before it could make vectors of it.
     """
-    num_layers, num_nodes = layers.even.shape[:2]
+    layers, view_secant = shared
+    num_layers, num_nodes = layers.tau.shape[0], layers.moments.shape[1]
     numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
 
     def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
@@ -87,16 +97,16 @@ def mode_slopes(
         a, p = layer.matrices(kernels, view_secant, single_scattering)
         return climb(stack, a, p, layer.tau, num_doublings)
 
-    def put_on_and_keep(stack, kept, layers, number, kernels, view_secant):
-        stack, new = put_on(stack, _one_of(layers, number), kernels, view_secant)
+    def put_on_and_keep(stack, kept, layers, number, odd, kernels, view_secant):
+        stack, new = put_on(stack, layers.layer(number, odd), kernels, view_secant)
         return stack, jax.tree.map(partial(_in_row, number), kept, new)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
 
     def up(carry, number):
-        return put_one(*carry, layers, number, kernels, view_secant), None
+        return put_one(*carry, layers, number, odd, kernels, view_secant), None
 
-    first = _one_of(layers, 0)
+    first = layers.layer(numbers[0], odd)
     shapes = jax.eval_shape(
         lambda: jax.tree.map(
             _joined, put_on(ground, first, kernels, view_secant)[1], is_leaf=_in_blocks
@@ -120,36 +130,20 @@ def mode_slopes(
         return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
 
     @compiled
-    def undo_one(carry, layers, kept, number, kernels, view_secant):
+    def undo_one(carry, layers, kept, number, odd, kernels, view_secant):
         fields, totals, slopes = carry
-        layer, own = _one_of((layers, kept), number)
-        own = jax.tree.map(lambda x, like: x.reshape(like.shape), own, shapes)
+        own = jax.tree.map(lambda x, like: read(x, number).reshape(like.shape), kept, shapes)
+        layer = layers.layer(number, odd)
         fields, totals, new = undo(fields, totals, layer, own, kernels, view_secant)
-        return fields, totals, _with_one(slopes, number, new)
+        return fields, totals, slopes.plus(number, odd, new)
 
     def down(carry, number):
-        return undo_one(carry, layers, kept, number, kernels, view_secant), None
+        return undo_one(carry, layers, kept, number, odd, kernels, view_secant), None
 
-    start = tuple(jnp.zeros_like(x) for x in (kernels[0].beams, kernels[1].beams, view_secant))
-    slopes = jax.tree.map(jnp.zeros_like, layers)
-    carry, _ = jax.lax.scan(down, (fields, start, slopes), numbers)
-    fields, (even, odd, view), slopes = carry
-    return reflection, kept, Slopes(slopes, even, odd, view, pair(1.0, fields))
-
-
-def _one_of(stacks: Any, number: Any) -> Any:
-    """What arrays with one entry a layer hold of a layer.
-
-    `number` is not of integers, which have no tangents to go through `one_kernel` with.
-    """
-    read = partial(jax.lax.dynamic_index_in_dim, index=_integer(number), axis=0, keepdims=False)
-    return jax.tree.map(read, stacks)
-
-
-def _with_one(stacks: Any, number: Any, new: Any) -> Any:
-    """The same arrays with `new` in place of that."""
-    write = partial(jax.lax.dynamic_update_index_in_dim, index=_integer(number), axis=0)
-    return jax.tree.map(write, stacks, new)
+    start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
+    carry, _ = jax.lax.scan(down, (fields, start, slopes.layers), numbers)
+    fields, (even, odd, view), layers = carry
+    return reflection, kept, Slopes(Shared(layers, view), even, odd, pair(1.0, fields))
 
 
 def _in_blocks(x: Any) -> bool:
@@ -172,13 +166,11 @@ def _in_row(number: Any, rows: Array, new: Any) -> Array:
 def _put(rows, part, number, start):
     @fenced
     def put(rows, part, number):
-        return jax.lax.dynamic_update_slice(rows, part[None], (_integer(number), jnp.int32(start)))
+        return jax.lax.dynamic_update_slice(
+            rows, part[None], (number.astype(jnp.int32), jnp.int32(start))
+        )
 
     return put(rows, part, number)
-
-
-def _integer(number):
-    return jnp.asarray(number).astype(jnp.int32)
 
 
 def _fields_at_the_top(stack: Bordered, weight):

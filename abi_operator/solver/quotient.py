@@ -6,7 +6,6 @@ The quotient is found by elimination (`_elimination.solve`), together with what 
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._elimination import inverse, solve
@@ -38,8 +37,8 @@ class Quotient(eqx.Module):
 
     def transposed_action(self, vector: Vector) -> Vector:
         """``right middle^-1`` applied to a vector without a sun (see `Bordered.__matmul__`)."""
-        nodes = jnp.sum(self.core.joined() * vector.nodes[:, None], axis=0)
-        beams = jnp.sum(self.border.joined() * vector.nodes[:, None], axis=0)
+        nodes = total(self.core.joined() * vector.nodes[:, None])
+        beams = total(self.border.joined() * vector.nodes[:, None])
         return Vector(nodes, beams + self.ratio * vector.beams)
 
 

@@ -14,7 +14,7 @@ PROGRAM = """
 import sys
 import jax
 import numpy as np
-from abi_operator.solver import toa_brf
+from abi_operator.solver import toa_brf, toa_radiance
 
 jax.config.update("jax_enable_x64", True)
 num_streams, num_layers, count = map(int, sys.argv[1:])
@@ -28,13 +28,22 @@ for dtype in (np.float64, np.float32):
     total = lambda x: toa_brf(*x, num_streams=num_streams, num_doublings=2).sum()
     value, (slope, *_) = jax.value_and_grad(total)(arguments)
     assert np.isfinite(total(arguments)) and np.isfinite(slope).all()
+    options = {"num_streams": num_streams, "num_doublings": 2, "single_scattering": None}
+    views = [x[:, None] * np.ones(7, dtype) for x in arguments[5:]]
+    assert np.isfinite(toa_brf(*arguments[:5], *views, multiple_views=True, **options)).all()
+    sources = {
+        "solar_irradiance": np.ones(count, dtype),
+        "planck_levels": np.ones((count, num_layers + 1), dtype),
+        "surface_emission": np.ones(count, dtype),
+    }
+    assert np.isfinite(toa_radiance(*arguments, **sources, **options)).all()
 """
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("num_streams, num_layers", [(4, 1), (4, 3), (8, 3), (12, 3), (16, 3)])
 def test_value_and_gradient_compile_with_every_thread(num_streams, num_layers):
-    """In both precisions, more columns than a tile has."""
+    """In both precisions, more columns than a tile has; also several views, and heat."""
     environment = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAX_ENABLE_X64")}
     sizes = map(str, (num_streams, num_layers, 260))
     subprocess.run([sys.executable, "-c", PROGRAM, *sizes], env=environment, check=True)
