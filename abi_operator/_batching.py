@@ -33,22 +33,19 @@ _FEWEST_A_DEVICE = 4 * _VECTOR
 _GPU_TILE = 4096
 
 
-def tile_size(num_streams: int, dtype: Any, slopes: bool = False) -> int:
-    """Columns that are solved together, at most, for values or for slopes written out (`adjoint`).
+def tile_size(num_streams: int, dtype: Any) -> int:
+    """Columns that are solved together, at most.
 
-    The fewer, the more of a layer is in the cache next to the processor, and of what the slopes
-    keep of all layers in the next one; the more, the less the start of a kernel counts; below 64
-    LLVM unrolls short loops over them number by number, without vectors (`_numerics.weighted_rows`
-    has what was done about it). Where a layer is one kernel (`_kernels`) a tile is also small
-    enough for that.
+    The fewer, the more of a layer is in the cache next to the processor; the more, the less the
+    start of a kernel counts; below 64 LLVM unrolls short loops over them number by number, without
+    vectors (`_numerics.weighted_rows` has what was done about it). Where a layer is one kernel
+    (`_kernels`) a tile is also small enough for that.
     """
     if jax.default_backend() != "cpu":
         return _GPU_TILE
     single = jnp.dtype(dtype) == jnp.float32
     if num_streams > 16:
         return 64 if single else 32
-    if num_streams > 8 and slopes and not single:
-        return 32
     return 128 if single and num_streams > 8 else 64
 
 

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ._kernels import one_kernel
 from ._numerics import Rows, fenced, kernel_of_product, matmul, product, total, transpose
 
 _CLOSED_FORM = 2  # rows up to which an inverse is written down at once
@@ -45,10 +46,16 @@ def _inverse_by_halves(a):
 def _eliminated(a):
     """p^-1, p^-1 q and the inverse of the Schur complement."""
     half = a.shape[0] // 2
-    p_inverse = _inverse_by_halves(a[:half, :half])
+    inverse_of_half = _as_kernel if a.shape[0] > _HALVED_AGAIN else _inverse_by_halves
+    p_inverse = inverse_of_half(a[:half, :half])
     u = kernel_of_product(_first_times_second, half)(p_inverse, a)
     schur = kernel_of_product(_schur_complement, half)(a, u)
-    return p_inverse, u, _inverse_by_halves(schur)
+    return p_inverse, u, inverse_of_half(schur)
+
+
+def _as_kernel(a):
+    """Inverse in one kernel, of a matrix that is part of one too large to be in a kernel itself."""
+    return one_kernel(_inverse_by_halves, a.shape[0], in_parts=True)(a)
 
 
 @fenced
@@ -135,7 +142,7 @@ def _factors_of(a, start, n, largest):
         own = slice(start, start + n)
         if n <= _CLOSED_FORM:
             return fenced(lambda a: _inverse_of_one_or_two(a[own, own]))(a)
-        return inverse(a[own, own])
+        return one_kernel(inverse, n, in_parts=True)(a[own, own])
     middle, end = start + n // 2, start + n
     first = _factors_of(a, start, n // 2, largest)
     u = _substituted(first, a, slice(start, middle), slice(middle, end))

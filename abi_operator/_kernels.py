@@ -38,9 +38,11 @@ def one_kernel(
     and does not compile a program with one: an operation on half a megabyte, or of more arithmetic
     than bytes on 20 kilobytes. With the tiles of `_batching` there is none of the second kind up to
     8 rows in float64, nor up to 4 in float32, whose bytes are half as many (8 where sums come
-    `in_parts`); larger ones are left as they are. So is a function with an operation of the first
-    kind (of very many layers), and so are derivatives of `function` and what `jax.vmap` makes of
-    it, in which nobody has counted.
+    `in_parts`). A function of larger ones is not marked, but one call all the same: taken apart, in
+    a loop over layers, its parts that need the layer alone would be computed for all layers ahead
+    and read one by one, by a hundred kernels. A function with an operation of the first kind (of
+    very many layers) is left as it is, and so are derivatives of `function` and what `jax.vmap`
+    makes of it, in which nobody has counted.
 
     Nor does XLA compile a kernel with an argument that is of no use in it (the process ends with
     "All or none of the slices should have an explicit index"). Arguments that `function` does not
@@ -60,9 +62,6 @@ def one_kernel(
 
     def call(*args: Any) -> Any:
         leaves, structure = jax.tree.flatten(args)
-        double = jnp.result_type(*leaves) == jnp.float64
-        if num_nodes > (_LARGEST if double or in_parts else _LARGEST_OF_FLOAT32):
-            return function(*args)
 
         def flat(*leaves: Any) -> Any:
             return function(*jax.tree.unflatten(structure, leaves))
@@ -70,13 +69,20 @@ def one_kernel(
         jaxpr, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
         body, used = pe.dce_jaxpr(jaxpr.jaxpr, [True] * len(jaxpr.jaxpr.outvars))
         wanted = [x for x, use in zip(leaves, used, strict=True) if use]
+        small = small_enough(num_nodes, jnp.result_type(*leaves), in_parts)
         empty = any(x.size == 0 for x in wanted)
-        if empty or _largest_operation(body) >= _SHARED_FROM:
+        if empty or (small and _largest_operation(body) >= _SHARED_FROM):
             return function(*args)
-        results = _one_kernel.bind(*wanted, jaxpr=ClosedJaxpr(body, jaxpr.consts))
+        results = _one_kernel.bind(*wanted, jaxpr=ClosedJaxpr(body, jaxpr.consts), small=small)
         return jax.tree.unflatten(jax.tree.structure(shape), results)
 
     return call
+
+
+def small_enough(num_nodes: int, dtype: Any, in_parts: bool = False) -> bool:
+    """Whether matrices with so many rows can be in one kernel; see there for the arguments."""
+    double = jnp.dtype(dtype) == jnp.float64
+    return num_nodes <= (_LARGEST if double or in_parts else _LARGEST_OF_FLOAT32)
 
 
 def _largest_operation(jaxpr: Any) -> int:
@@ -91,22 +97,24 @@ def _largest_operation(jaxpr: Any) -> int:
 
 
 @_one_kernel.def_impl
-def _impl(*leaves: Any, jaxpr: ClosedJaxpr) -> Any:
-    return jax.jit(lambda *x: _one_kernel.bind(*x, jaxpr=jaxpr))(*leaves)
+def _impl(*leaves: Any, jaxpr: ClosedJaxpr, small: bool) -> Any:
+    return jax.jit(lambda *x: _one_kernel.bind(*x, jaxpr=jaxpr, small=small))(*leaves)
 
 
 @_one_kernel.def_abstract_eval
-def _abstract_eval(*_: Any, jaxpr: ClosedJaxpr) -> Any:
+def _abstract_eval(*_: Any, jaxpr: ClosedJaxpr, small: bool) -> Any:
     return jaxpr.out_avals
 
 
-def _marked(*leaves: Any, jaxpr: ClosedJaxpr) -> Any:
+def _marked(*leaves: Any, jaxpr: ClosedJaxpr, small: bool) -> Any:
+    if not small:
+        return jaxpr_as_fun(jaxpr)(*leaves)
     compiled = jax.jit(jaxpr_as_fun(jaxpr))
     with set_xla_metadata(inlineable="false", xla_cpu_small_call="true"):
         return compiled(*leaves)
 
 
-def _jvp(primals: Any, tangents: Any, *, jaxpr: ClosedJaxpr) -> Any:
+def _jvp(primals: Any, tangents: Any, *, jaxpr: ClosedJaxpr, small: bool) -> Any:
     tangents = [
         jnp.zeros_like(x) if isinstance(t, ad.Zero) else t
         for x, t in zip(primals, tangents, strict=True)
@@ -114,7 +122,7 @@ def _jvp(primals: Any, tangents: Any, *, jaxpr: ClosedJaxpr) -> Any:
     return jax.jvp(jaxpr_as_fun(jaxpr), tuple(primals), tuple(tangents))
 
 
-def _batch(leaves: Any, axes: Any, *, jaxpr: ClosedJaxpr) -> Any:
+def _batch(leaves: Any, axes: Any, *, jaxpr: ClosedJaxpr, small: bool) -> Any:
     mapped = jax.vmap(jaxpr_as_fun(jaxpr), axes)(*leaves)
     return mapped, [0] * len(mapped)
 

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 _WRITTEN_OUT = 16  # longest sum of a matrix product that is written out
 _IN_PARTS = range(5, 9)  # such sums are two operations in float32
@@ -25,19 +25,67 @@ def fenced(function: Callable) -> Callable:
 
     XLA fuses chains of written-out matrix products and then recomputes their parts, which makes a
     layer several times slower. A call that is not inlined stops it, and derivatives and `vmap`
-    pass through; `jax.lax.optimization_barrier` is dropped before fusion on the CPU.
+    pass through; `jax.lax.optimization_barrier` is dropped before fusion on the CPU. Every
+    `jax.jit` inside becomes such a call, too, also those in JAX's own functions. An `Entry` among
+    the arguments reaches `function` as an array.
     """
-    compiled = jax.jit(function)
+    compiled = jax.jit(_reading(function))
 
     @wraps(function)
     def call(*args):
         # As arguments, Python's numbers would be of double precision.
-        dtype = jnp.result_type(*(x for x in jax.tree.leaves(args) if not isinstance(x, float)))
+        arrays = [x for x in jax.tree.leaves(args) if not isinstance(x, float)]
+        dtype = jnp.result_type(*(x for x in arrays if jnp.issubdtype(x.dtype, jnp.floating)))
         args = jax.tree.map(lambda x: jnp.asarray(x, dtype) if isinstance(x, float) else x, args)
         with set_xla_metadata(inlineable="false"):
             return compiled(*args)
 
     return call
+
+
+class Entry(eqx.Module):
+    """One entry of a stack, given to a kernel that reads it in its place, without a copy.
+
+    Parameters
+    ----------
+    stack
+        Entries in one row each.
+    place
+        Number of the entry.
+    shape
+        Of the entry.
+    """
+
+    stack: Float[Array, "entry number"]
+    place: Int[Array, ""]
+    shape: tuple[int, ...] = eqx.field(static=True)
+
+    def read(self) -> Array:
+        """The entry as an array."""
+        # Not `jax.lax.dynamic_index_in_dim`: a fence is passed on to all that is a `jax.jit`.
+        size = self.stack.shape[1]
+        row = jax.lax.dynamic_slice(self.stack, (self.place, jnp.int32(0)), (1, size))
+        return row.reshape(self.shape)
+
+
+def is_entry(x: Any) -> bool:
+    """Whether it is an entry of a stack, for `jax.tree`'s `is_leaf`."""
+    return isinstance(x, Entry)
+
+
+def as_array(x: Any) -> Any:
+    """The same, read if it is an entry of a stack."""
+    return x.read() if isinstance(x, Entry) else x
+
+
+def _reading(function: Callable) -> Callable:
+    """`function` of arrays, some of which may be entries of a stack."""
+
+    @wraps(function)
+    def read(*args):
+        return function(*jax.tree.map(as_array, args, is_leaf=is_entry))
+
+    return read
 
 
 def safe_divide(numerator: Float[Array, "*#n"], denominator: Float[Array, "*#n"]) -> Array:
@@ -103,7 +151,7 @@ def kernel_of_product(function: Callable, inner: int) -> Callable:
 
     A ``dot`` is a kernel by itself, and no part of any other.
     """
-    return fenced(function) if inner <= _WRITTEN_OUT else function
+    return fenced(function) if inner <= _WRITTEN_OUT else _reading(function)
 
 
 def matmul(

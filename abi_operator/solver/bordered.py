@@ -25,7 +25,7 @@ import jax
 from jaxtyping import Array, Float
 
 from .._elimination import inverse
-from .._numerics import fenced, matmul, total, weighted, weighted_rows
+from .._numerics import as_array, fenced, is_entry, matmul, total, weighted, weighted_rows
 
 _ENOUGH_COLUMNS = 64  # for which LLVM makes vectors of any loop, see `weighted_rows`
 
@@ -124,11 +124,15 @@ def combined(weights: Sequence[float | Float[Array, "..."]], matrices: Sequence[
 
     One kernel, or where there are few columns one in long rows for each array.
     """
-    leaves = list(zip(*map(jax.tree.leaves, matrices), strict=True))
+    leaves = list(zip(*map(_leaves, matrices), strict=True))
     if leaves[0][0].shape[-1] >= _ENOUGH_COLUMNS:
         return _combined(weights, matrices)
-    sums = [weighted_rows(weights, x) for x in leaves]
-    return jax.tree.unflatten(jax.tree.structure(matrices[0]), sums)
+    sums = [weighted_rows(weights, [as_array(x) for x in arrays]) for arrays in leaves]
+    return jax.tree.unflatten(jax.tree.structure(matrices[0], is_leaf=is_entry), sums)
+
+
+def _leaves(matrix):
+    return jax.tree.leaves(matrix, is_leaf=is_entry)
 
 
 @fenced

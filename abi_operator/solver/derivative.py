@@ -30,7 +30,6 @@ def independent_columns(
     program: Callable[[Any], Any],
     tile: int,
     gradient: Callable[[Any], tuple[Any, Any]] | None = None,
-    gradient_tile: int | None = None,
 ) -> Callable[[Any], Any]:
     """Solve columns tile by tile, with derivatives and `jax.vmap` as they are cheapest.
 
@@ -47,8 +46,6 @@ def independent_columns(
         column's result: those of its first array in order, then those of its second, and so on.
         Second derivatives differentiate it again; slopes that nobody wants are not compiled.
         None is reverse mode through `program`.
-    gradient_tile
-        Columns a tile of the gradient; None for as many as of the value.
 
     Returns
     -------
@@ -71,9 +68,7 @@ def independent_columns(
 
         def rule(primals: tuple[Leaves], tangents: tuple[list[Any]]) -> tuple[Any, Any]:
             wanted = [_perturbs(tangent) for tangent in tangents[0]]
-            both = _linearised(
-                lambda leaves: value_and_slopes(leaves, wanted), gradient_tile or tile
-            )
+            both = _linearised(lambda leaves: value_and_slopes(leaves, wanted), tile)
             result, slopes = both(primals[0])
             return result, _contracted(slopes, _chosen(tangents[0], wanted), result)
 

@@ -1,11 +1,13 @@
 """One layer on the way up, which keeps what the way down needs, and on the way down."""
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._kernels import one_kernel, small_enough
 from .._numerics import fenced
 from .bordered import Bordered, combined, reciprocal
 from .fields import Action, Feed, Fields, act, advance, feed, pair, split
@@ -86,7 +88,10 @@ class Layers(NamedTuple):
 
 def read(stack: Float[Array, "layer *own"], place: Array) -> Float[Array, "*own"]:
     """One entry of an array."""
-    return jax.lax.dynamic_index_in_dim(stack, place.astype(jnp.int32), 0, keepdims=False)
+    # Not `jax.lax.dynamic_index_in_dim`, which as a `jax.jit` would be a kernel and a copy: what
+    # is read is part of the kernel that uses it, what `_add` writes must be a kernel.
+    start = place.astype(jnp.int32), *(jnp.int32(0) for _ in stack.shape[1:])
+    return jax.lax.dynamic_slice(stack, start, (1, *stack.shape[1:]))[0]
 
 
 def _add(stack, place, new):
@@ -225,7 +230,10 @@ def descend(
 
     start = tau * (0.5 / 2**num_doublings)
     square = start * start
-    own = _own_beams(secants, kept.b_inverse.diagonal, start, num_doublings)
+    own_beams = partial(_own_beams, num_doublings=num_doublings)
+    if not small_enough(fields.nodes.shape[0], tau.dtype):
+        own_beams = one_kernel(own_beams, 1)
+    own = own_beams(secants, kept.b_inverse.diagonal, start)
     p = feed(kept.b_inverse)
     z = [combined([1.0, square], [p, kept.fraction])]
     for k, y in enumerate(kept.admittances):

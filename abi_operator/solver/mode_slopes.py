@@ -35,13 +35,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._kernels import one_kernel
-from .._numerics import Rows, fenced, matmul
+from .._kernels import one_kernel, small_enough
+from .._numerics import Entry, Rows, as_array, fenced, is_entry, matmul
 from .adding import top
 from .bordered import Bordered
 from .fields import Fields, pair
 from .layer import ModeKernels
-from .layer_adjoint import Layer, Layers, climb, descend, read
+from .layer_adjoint import Layer, Layers, climb, descend
 from .pull_back import MatrixSlopes, undo_matrix
 
 Kernels = tuple[ModeKernels, ModeKernels]
@@ -86,12 +86,18 @@ def mode_slopes(
     """
     layers, view_secant = shared
     num_layers, num_nodes = layers.tau.shape[0], layers.moments.shape[1]
-    numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
+    dtype = layers.tau.dtype
+    numbers = jnp.arange(num_layers, dtype=dtype)
 
     def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
         # A layer that is the only one fills the room: in the kernel XLA finds no use for its
         # number, nor for what was in the room (see `one_kernel`).
         return function if numbers.size == 1 else one_kernel(function, num_nodes, **how)
+
+    def moved_at_once(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
+        # In a layer that is too large for one kernel, all that is only moved is one.
+        alone = numbers.size == 1 or small_enough(num_nodes, dtype, **how)
+        return function if alone else one_kernel(function, 1)
 
     def put_on(stack, layer, kernels, view_secant):
         a, p = layer.matrices(kernels, view_secant, single_scattering)
@@ -99,7 +105,11 @@ def mode_slopes(
 
     def put_on_and_keep(stack, kept, layers, number, odd, kernels, view_secant):
         stack, new = put_on(stack, layers.layer(number, odd), kernels, view_secant)
-        return stack, jax.tree.map(partial(_in_row, number), kept, new)
+        return stack, keep(kept, new, number)
+
+    @partial(moved_at_once, in_parts=True)
+    def keep(kept, new, number):
+        return jax.tree.map(partial(_in_row, number.astype(jnp.int32)), kept, new)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
 
@@ -132,10 +142,18 @@ def mode_slopes(
     @compiled
     def undo_one(carry, layers, kept, number, odd, kernels, view_secant):
         fields, totals, slopes = carry
-        own = jax.tree.map(lambda x, like: read(x, number).reshape(like.shape), kept, shapes)
+        own = entries(kept, number) if small_enough(num_nodes, dtype) else arrays(kept, number)
         layer = layers.layer(number, odd)
         fields, totals, new = undo(fields, totals, layer, own, kernels, view_secant)
         return fields, totals, slopes.plus(number, odd, new)
+
+    def entries(kept, number):
+        place = number.astype(jnp.int32)
+        return jax.tree.map(lambda x, like: Entry(x, place, like.shape), kept, shapes)
+
+    @moved_at_once
+    def arrays(kept, number):
+        return jax.tree.map(as_array, entries(kept, number), is_leaf=is_entry)
 
     def down(carry, number):
         return undo_one(carry, layers, kept, number, odd, kernels, view_secant), None
@@ -154,23 +172,21 @@ def _joined(x: Any) -> Array:
     return x.joined() if isinstance(x, Rows) else x
 
 
-def _in_row(number: Any, rows: Array, new: Any) -> Array:
+def _in_row(place: Any, rows: Array, new: Any) -> Array:
     """The array with `new` in that row; a matrix in blocks is put together on the way."""
     start = 0
     for block in new.blocks if isinstance(new, Rows) else (new,):
-        rows = _put(rows, block.reshape(-1), number, start)
+        rows = _put(rows, block.reshape(-1), place, start)
         start += block.size
     return rows
 
 
-def _put(rows, part, number, start):
+def _put(rows, part, place, start):
     @fenced
-    def put(rows, part, number):
-        return jax.lax.dynamic_update_slice(
-            rows, part[None], (number.astype(jnp.int32), jnp.int32(start))
-        )
+    def put(rows, part, place):
+        return jax.lax.dynamic_update_slice(rows, part[None], (place, jnp.int32(start)))
 
-    return put(rows, part, number)
+    return put(rows, part, place)
 
 
 def _fields_at_the_top(stack: Bordered, weight):

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._numerics import fenced, product, total, transpose
+from .._numerics import fenced, kernel_of_product, product, total, transpose
 from .bordered import Bordered
 from .fields import (
     Action,
@@ -230,7 +230,7 @@ def undo_matrix(
     products of these with their own slopes add up to its product with its cotangent.
     """
     core, own, rest = _undo_diagonal(bar.core, coalbedo)
-    pairs, nodes = _on_pairs(kernels.pairs, core), _on_nodes(kernels.nodes, bar.border)
+    pairs, nodes = _on_pairs(kernels.nodes, core), _on_nodes(kernels.nodes, bar.border)
     corner = bar.corner if single_scattering else None
     slopes = _undo_products(
         pairs, nodes, kernels.beams, moments, secants, bar.diagonal, corner, rest
@@ -263,17 +263,20 @@ def _undo_diagonal(core, coalbedo):
     return kept(core, coalbedo)
 
 
+def _on_pairs(nodes, core):
+    """Of each degree, the core between its functions: two short sums, for one over all pairs."""
+    half = kernel_of_product(_by_degrees, nodes.shape[0])(nodes, core)
+    return _on_same_degree(nodes, half)
+
+
+def _by_degrees(nodes, core):
+    return product(core, nodes[(...,) + (None,) * (core.ndim - 2)])
+
+
 @fenced
-def _on_pairs(pairs, core):
-    n = core.shape[0]
-    expand = (slice(None),) + (None,) * (core.ndim - 2)
-    return total(
-        [
-            pairs[i, j][expand] * (core[i, i] if i == j else core[i, j] + core[j, i])
-            for i in range(n)
-            for j in range(i + 1)
-        ]
-    )
+def _on_same_degree(nodes, half):
+    expand = (slice(None),) + (None,) * (half.ndim - 2)
+    return total([nodes[i][expand] * half[i] for i in range(nodes.shape[0])])
 
 
 @fenced

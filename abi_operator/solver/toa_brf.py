@@ -159,12 +159,10 @@ def prepare(
 
 @partial(jax.jit, static_argnums=(1, 2))
 def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
-    size = partial(tile_size, options.num_streams, column.tau.dtype)
     solve = independent_columns(
         lambda tile: emerging(tile, options).brf,
-        size(),
+        tile_size(options.num_streams, column.tau.dtype),
         partial(_view_by_view, options=options) if multiple_views else None,
-        size(slopes=True),
     )
     return solved(column, multiple_views, solve)
 

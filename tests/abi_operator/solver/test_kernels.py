@@ -1,4 +1,4 @@
-"""Whole layers as one kernel compile wherever XLA has threads to share operations among.
+"""Layers, or parts of larger ones, as one kernel compile wherever XLA has threads to share work.
 
 The other tests run with one thread. A kernel that XLA cannot compile ends the process, hence
 processes of their own.
@@ -41,7 +41,9 @@ for dtype in (np.float64, np.float32):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("num_streams, num_layers", [(4, 1), (4, 3), (8, 3), (12, 3), (16, 3)])
+@pytest.mark.parametrize(
+    "num_streams, num_layers", [(4, 1), (4, 3), (8, 3), (12, 3), (16, 3), (20, 3)]
+)
 def test_value_and_gradient_compile_with_every_thread(num_streams, num_layers):
     """In both precisions, more columns than a tile has; also several views, and heat."""
     environment = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAX_ENABLE_X64")}

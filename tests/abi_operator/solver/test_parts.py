@@ -7,7 +7,7 @@ import pytest
 
 from abi_operator._batching import map_tiles
 from abi_operator._elimination import inverse, solve
-from abi_operator._numerics import matmul, safe_divide, safe_sqrt
+from abi_operator._numerics import Entry, fenced, matmul, safe_divide, safe_sqrt
 from abi_operator.solver import double_gauss, sufficient_doublings
 from abi_operator.solver.bordered import Bordered, Vector
 from abi_operator.solver.delta_m import delta_m
@@ -174,6 +174,23 @@ def test_quotients_of_positive_definite_matrices(n):
     for slope, above, below in zip(slopes, along(1e-5), along(-1e-5), strict=True):
         scale = np.abs(slope).max()  # differences of 1e-5 are right to 1e-10 of what they divide
         np.testing.assert_allclose(slope, (above - below) / 2e-5, atol=1e-6 * scale)
+
+
+def test_an_entry_of_a_stack_is_read_by_the_kernel_it_is_given_to():
+    """Forward and reverse mode and `jax.vmap` reach the stack through it."""
+    stack = jnp.asarray(np.random.default_rng(5).uniform(1, 2, (3, 8)))
+    factor = jnp.asarray([1.0, 2.0])
+
+    def scaled(stack, place):
+        return fenced(lambda x, y: x * y)(Entry(stack, place, (2, 2, 2)), factor)
+
+    expected = np.asarray(stack).reshape(3, 2, 2, 2) * np.asarray(factor)
+    places = jnp.arange(3)
+    np.testing.assert_array_equal(jax.vmap(scaled, (None, 0))(stack, places), expected)
+    slope = jax.grad(lambda x: jnp.sum(scaled(x, places[1])))(stack)
+    np.testing.assert_array_equal(slope, [np.zeros(8), np.tile(factor, 4), np.zeros(8)])
+    change = jax.jvp(lambda x: scaled(x, places[2]), (stack,), (jnp.ones_like(stack),))[1]
+    np.testing.assert_array_equal(change, np.broadcast_to(factor, (2, 2, 2)))
 
 
 def test_map_tiles_fills_up_the_last_tile():
