@@ -226,7 +226,8 @@ def descend(
     """Fields below a layer from those above; cotangents of A and B over h (`mode_slopes`)."""
     h = 0.5 * tau
     drop = act(kept.adding, fields)
-    mean, below = advance(fields, drop, 0.5 * h), advance(fields, drop, h)
+    mean = advance(fields, drop, 0.5 * h)
+    below = advance(mean, drop, 0.5 * h)  # last of `fields`, so that XLA can write over them
 
     start = tau * (0.5 / 2**num_doublings)
     square = start * start
