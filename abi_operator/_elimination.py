@@ -37,7 +37,7 @@ def _inverse_jvp(primals, tangents):
 def _inverse_by_halves(a):
     n = a.shape[0]
     if n <= _CLOSED_FORM:
-        return _inverse_of_one_or_two(a)
+        return fenced(_inverse_of_one_or_two)(a)
     p_inverse, u, schur_inverse = _eliminated(a)
     w = matmul(u, schur_inverse)
     return kernel_of_product(_joined, n - n // 2)(p_inverse, w, u, schur_inverse)
@@ -58,7 +58,6 @@ def _as_kernel(a):
     return one_kernel(_inverse_by_halves, a.shape[0], in_parts=True)(a)
 
 
-@fenced
 def _inverse_of_one_or_two(a):
     if a.shape[0] == 1:
         return 1 / a

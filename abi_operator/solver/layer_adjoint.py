@@ -16,7 +16,7 @@ from .pull_back import undo_inverse, undo_start, undouble
 from .quotient import Quotient, minus_and_quotient
 
 # Doublings undone by fields: matrices are as fast with few nodes, and faster than many fields.
-_BY_FIELDS, _BY_FIELDS_OF_FEW, _FEW_NODES = 2, 1, 3
+_BY_FIELDS, _BY_FIELDS_OF_FEW, _FEW_NODES = 2, 1, 4
 
 
 class Layer(NamedTuple):
