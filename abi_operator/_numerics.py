@@ -63,9 +63,10 @@ class Entry(eqx.Module):
     def read(self) -> Array:
         """The entry as an array."""
         # Not `jax.lax.dynamic_index_in_dim`: a fence is passed on to all that is a `jax.jit`.
-        size = self.stack.shape[1]
-        row = jax.lax.dynamic_slice(self.stack, (self.place, jnp.int32(0)), (1, size))
-        return row.reshape(self.shape)
+        start = self.place, jnp.zeros_like(self.place)
+        return jax.lax.dynamic_slice(self.stack, start, (1, self.stack.shape[1])).reshape(
+            self.shape
+        )
 
 
 def is_entry(x: Any) -> bool:
