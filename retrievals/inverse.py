@@ -58,7 +58,7 @@ class Inversion(eqx.Module):
     num_steps
         Evaluations of the forward model. [-]
     converged
-        Whether the tolerance was met.
+        Whether the tolerance was met, by the last step or by the one that is next.
     """
 
     x: Float[Array, "*batch x"]
@@ -124,6 +124,10 @@ def invert(
     residual, jacobian = solution.aux
     num_bands = len(forward.bands)
     covariance = posterior_covariance(jacobian)
+    # A cost known to its last digits only may refuse every further step: that is the end, too.
+    step = covariance @ (jacobian.T @ residual)
+    settled = _negligible(step, solution.value, minimiser.tolerance)
+    settled &= _negligible(jacobian @ step, residual, minimiser.tolerance)
     return Inversion(
         x=solution.value,
         covariance=covariance,
@@ -131,8 +135,13 @@ def invert(
         measurement_cost=jnp.sum(residual[:num_bands] ** 2),
         prior_cost=jnp.sum(residual[num_bands:] ** 2),
         num_steps=jnp.asarray(solution.stats["num_steps"]),
-        converged=solution.result == optx.RESULTS.successful,
+        converged=(solution.result == optx.RESULTS.successful) | settled,
     )
+
+
+def _negligible(change: Array, of: Array, tolerance: float) -> Array:
+    """As optimistix judges a step; what is not finite is not negligible."""
+    return jnp.all(jnp.abs(change) < tolerance * (1 + jnp.abs(of)))
 
 
 def _value_and_jacobian(

@@ -53,6 +53,7 @@ def test_single_scattering_albedo_is_recovered_with_it(make_result):
     assert (retrieval["ssa_sigma"].where(success) > 0).sum() == 3 * success.sum()
     unaware = retrieve_smoke(known)
     assert (unaware["result_code"][DARK] == ResultCode.POOR_FIT).all()
+    assert (unaware["num_steps"][DARK] <= 16).all()  # though rounding may refuse the last step
 
 
 def test_times_and_refusals_keep_their_places(simulated):
