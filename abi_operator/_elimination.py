@@ -141,7 +141,7 @@ def _factors_of(a, start, n, largest):
         own = slice(start, start + n)
         if n <= _CLOSED_FORM:
             return fenced(lambda a: _inverse_of_one_or_two(a[own, own]))(a)
-        return one_kernel(inverse, n, in_parts=True)(a[own, own])
+        return _as_kernel(a[own, own])
     middle, end = start + n // 2, start + n
     first = _factors_of(a, start, n // 2, largest)
     u = _substituted(first, a, slice(start, middle), slice(middle, end))
