@@ -12,7 +12,7 @@ from .._numerics import fenced
 from .bordered import Bordered, combined, reciprocal
 from .fields import Action, Feed, Fields, act, advance, feed, pair, split
 from .layer import ModeKernels, conservative, layer_matrix, start_coefficient
-from .pull_back import undo_inverse, undo_start, undouble
+from .pull_back import undo_start, undouble
 from .quotient import Quotient, minus_and_quotient
 
 # Doublings undone by fields: matrices are as fast with few nodes, and faster than many fields.
@@ -223,7 +223,7 @@ def descend(
     kept: Kept,
     num_doublings: int,
 ) -> tuple[Fields, Bordered, Bordered]:
-    """Fields below a layer from those above; cotangents of A and B over h (`mode_slopes`)."""
+    """Fields below a layer from those above; cotangents of A and B^-1 over h (`mode_slopes`)."""
     h = 0.5 * tau
     drop = act(kept.adding, fields)
     mean = advance(fields, drop, 0.5 * h)
@@ -254,7 +254,7 @@ def descend(
     y_bar, z_bar = pair(2.0, mean), pair(0.5, drop)
     for k in reversed(range(num_doublings - by_fields)):
         y_bar, z_bar = undouble(quotients[k], start * 2.0**k, y_bar, z_bar)
-    a_bar, p_bar = undo_start(
+    return below, *undo_start(
         Action(*kept.inner, own.ratios[0], own.overs[0], kept.a, inner),
         Action(*kept.by_a, own.ratios[1], own.overs[1], kept.a, z[0]),
         own.ratios[2],
@@ -264,4 +264,3 @@ def descend(
         y_bar,
         z_bar,
     )
-    return below, a_bar, undo_inverse(kept.b_inverse, p_bar)

@@ -23,8 +23,8 @@ start (`layer.half_layer`), with :math:`U = Z^{-1}A`, :math:`W = Z^{-1}C`,
        + h^2[1/3 - \tfrac{h^2}{9}(V\oplus V) + \tfrac{dh^4}{9}V\otimes V]\bar Z, \\
    \bar B &= -(B^{-1}\otimes B^{-1})[Q + h^2M + \tfrac{5h^4}{9}(V\otimes V)\bar Z],
 
-all over h. A layer depends on hA and hB alone, so that its derivative in h is
-:math:`\langle\bar A, A\rangle + \langle\bar B, B\rangle`.
+all over h; the last is never formed (`pull_back.undo_inverse`). A layer depends on hA and hB alone,
+so that its derivative in h is :math:`\langle\bar A, A\rangle + \langle\bar B, B\rangle`.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ from .bordered import Bordered
 from .fields import Fields, pair
 from .layer import ModeKernels
 from .layer_adjoint import Layer, Layers, climb, descend
-from .pull_back import MatrixSlopes, undo_matrix
+from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 
 Kernels = tuple[ModeKernels, ModeKernels]
 
@@ -131,11 +131,11 @@ def mode_slopes(
         # The beams' own entries of the stack are 1 whatever happens in it.
         fields = fields._replace(other=jnp.zeros_like(fields.other))
         secants = layer.secants(view_secant)
-        fields, a_bar, b_bar = descend(fields, layer.tau, secants, kept, num_doublings)
+        fields, a_bar, p_bar = descend(fields, layer.tau, secants, kept, num_doublings)
         a, coalbedo = undo_matrix(
             kernels[0], layer.even, secants, a_bar, single_scattering, layer.coalbedo
         )
-        b, _ = undo_matrix(kernels[1], layer.odd, secants, b_bar, single_scattering)
+        b = undo_inverse(kernels[1], layer.odd, kept.b_inverse, p_bar, single_scattering)
         step = 0.5 / 2**num_doublings
         return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
 

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._numerics import fenced, kernel_of_product, product, total, transpose
+from .._numerics import fenced, kernel_of_product, matmul, product, total, transpose
 from .bordered import Bordered
 from .fields import (
     Action,
@@ -22,7 +22,6 @@ from .fields import (
     edge,
     side,
     side_of_beams,
-    side_of_nodes,
     swapped,
     symmetric,
 )
@@ -186,27 +185,6 @@ def _start_edges(square, d, y_bar, w, ratio_w, z, v, ratio_v, p_edge):
     return Edge(*a), Edge(*(p + (5 / 9) * quartic * t for p, t in zip(p_edge, twice, strict=True)))
 
 
-def undo_inverse(p: Bordered, p_bar: Bordered) -> Bordered:
-    """Cotangent of a matrix from that of its inverse p."""
-    core, border = side_of_nodes(p.core, p.border, p_bar.core, p_bar.border, p_bar.corner)
-    return Bordered(
-        _minus_twice_core(core, border, p.border, p_bar.corner, p.core),
-        *_inverse_edge(edge(p), border, edge(p_bar)),
-    )
-
-
-@fenced
-def _minus_twice_core(core, border, sent, corner, left):
-    return -both_sides(core, border, sent, corner, left)
-
-
-@fenced
-def _inverse_edge(p, border, p_bar):
-    diagonal = total(p.border * p_bar.border) + p.corner * p_bar.corner
-    diagonal = diagonal + p.diagonal * p_bar.diagonal
-    return tuple(-x for x in _twice(p.diagonal, border, diagonal, p_bar))
-
-
 class MatrixSlopes(NamedTuple):
     """Slopes over h in what one matrix is made of, and its part of the slope in h."""
 
@@ -236,6 +214,55 @@ def undo_matrix(
         pairs, nodes, kernels.beams, moments, secants, bar.diagonal, corner, rest
     )
     return slopes, own
+
+
+def undo_inverse(
+    kernels: ModeKernels,
+    moments: Float[Array, "degree *batch"],
+    p: Bordered,
+    p_bar: Bordered,
+    single_scattering: bool,
+) -> MatrixSlopes:
+    r"""Pull-back of the inverse p of `layer_matrix`.
+
+    :math:`\bar B = -p\bar p p` is seen by the functions of each degree alone, so that p is applied
+    to these, and not to the cotangent on both sides. As dp = -p where dB = B, the products of all
+    that B is made of with its own slopes add up to :math:`-\langle\bar p, p\rangle`.
+    """
+    border = _border_of_side(p.core, p.border, p_bar.border, p_bar.corner)
+    solved = kernel_of_product(_by_degrees, moments.shape[0])(kernels.nodes, p.core)
+    driven = matmul(p_bar.core, solved)
+    sent, nodes = _on_nodes(kernels.nodes, p.border), _on_nodes(kernels.nodes, border)
+    pairs = _between_degrees(solved, driven, sent, nodes, p_bar.corner)
+    corner = p_bar.corner if single_scattering else None
+    cores = _columns_of_products(p.core, p_bar.core)
+    return _undo_inverse(pairs, nodes, kernels.beams, moments, edge(p), edge(p_bar), cores, corner)
+
+
+@fenced
+def _border_of_side(left, sent, border, corner):
+    return product(left, border) + swapped(sent) * corner
+
+
+@fenced
+def _between_degrees(solved, driven, sent, nodes, corner):
+    return total(solved * driven) + total(sent * nodes) - corner * sent[0] * sent[1]
+
+
+@fenced
+def _columns_of_products(x, y):
+    return total(x * y)
+
+
+@fenced
+def _undo_inverse(pairs, nodes, beams, moments, p: Edge, p_bar: Edge, cores, corner):
+    own = total(p.border * p_bar.border) + p.diagonal * p_bar.diagonal
+    passed = p.corner * p_bar.corner
+    if corner is not None:
+        corner = -p.diagonal[0] * p.diagonal[1] * corner
+    slope, to_beams = _of_products(-pairs, -p.diagonal[:, None] * nodes, beams, corner)
+    diagonal, h = -p.diagonal * (own + passed), -(total(cores) + own[0] + own[1] + passed[0])
+    return MatrixSlopes(-slope, -moments * to_beams, diagonal, h)
 
 
 def _undo_diagonal(core, coalbedo):
@@ -287,10 +314,14 @@ def _on_nodes(nodes, border):
 
 @fenced
 def _undo_products(core, nodes, beams, moments, secants, diagonal, corner, rest):
-    slope = core + total(beams * nodes)
-    to_beams = nodes
-    if corner is not None:
-        slope = slope + corner * beams[0] * beams[1]
-        to_beams = to_beams + corner * beams[::-1]
+    slope, to_beams = _of_products(core, nodes, beams, corner)
     h = rest + total(secants * diagonal) - total(moments * slope)
     return MatrixSlopes(-slope, -moments * to_beams, diagonal, h)
+
+
+def _of_products(pairs, nodes, beams, corner):
+    """Slopes in minus the moments, and in their products with what the beams are."""
+    if corner is None:
+        return pairs + total(beams * nodes), nodes
+    slope = pairs + total(beams * nodes) + corner * beams[0] * beams[1]
+    return slope, nodes + corner * beams[::-1]
