@@ -16,9 +16,9 @@ Quotients of one layer commute, so that only symmetric parts matter. Of a produc
 :math:`\langle X, dE \rangle = \langle (R\oplus R)X, dY\rangle - \langle (R\otimes R)X, dS\rangle`.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._numerics import fenced, product, total, transpose
@@ -26,7 +26,7 @@ from .bordered import Bordered
 
 
 class Fields(NamedTuple):
-    """Sun's and view's field on the axis `beam`; several pairs on the axis `pair`.
+    """Sun's and view's field on the axis `beam`.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ class Fields(NamedTuple):
         At the other beam.
     """
 
-    nodes: Float[Array, "node beam pair *batch"]
-    own: Float[Array, "beam pair *batch"]
-    other: Float[Array, "beam pair *batch"]
+    nodes: Float[Array, "node beam *batch"]
+    own: Float[Array, "beam *batch"]
+    other: Float[Array, "beam *batch"]
 
 
 class Edge(NamedTuple):
@@ -95,17 +95,15 @@ def act(quotient: Action, fields: Fields) -> Fields:
 
 @fenced
 def _act_on_nodes(core, border, nodes, own):
-    flat = nodes.reshape(nodes.shape[0], -1, *nodes.shape[3:])
-    return product(core, flat).reshape(nodes.shape) + border[:, :, None] * own
+    return product(core, nodes) + border * own
 
 
 @fenced
 def _act_on_beams(ratio, over, right, middle, fields, nodes):
-    own = ratio[:, None] * fields.own
-    from_nodes = swapped(right.border)[:, :, None] * fields.nodes
-    from_nodes = from_nodes - swapped(middle.border)[:, :, None] * nodes
+    own = ratio * fields.own
+    from_nodes = swapped(right.border) * fields.nodes - swapped(middle.border) * nodes
     driven = total(from_nodes) + right.corner * fields.own - middle.corner * own
-    return own, driven * over[::-1, None] + ratio[::-1, None] * fields.other
+    return own, driven * over[::-1] + ratio[::-1] * fields.other
 
 
 def swapped(border):
@@ -120,48 +118,84 @@ def advance(fields: Fields, drop: Fields, h: Float[Array, "*batch"]) -> Fields:
 
 
 @fenced
-def split(
-    mean: Fields, drop: Fields, change: Fields, h: Float[Array, "*batch"]
-) -> tuple[Fields, Fields]:
-    """Means ``mean - h change +- h drop / 2`` and drops ``drop +- 2 change`` of two halves."""
-    means, drops = [], []
-    for x, fallen, changed, axis in zip(mean, drop, change, (2, 1, 1), strict=True):
-        middle, apart = x - h * changed, 0.5 * h * fallen
-        means.append(jnp.concatenate([middle + apart, middle - apart], axis))
-        drops.append(jnp.concatenate([fallen + 2 * changed, fallen - 2 * changed], axis))
-    return Fields(*means), Fields(*drops)
+def scaled(factor: float | Float[Array, "*batch"], fields: Fields) -> Fields:
+    """``factor fields``."""
+    return Fields(*(factor * x for x in fields))
 
 
-def pair(factor: float, fields: Fields) -> Bordered:
-    """Cotangent ``factor pair(F)``, summed over the pairs of fields."""
-    core = _pair_of_nodes(factor, fields.nodes)
-    return Bordered(core, *_pair_with_beams(factor, fields))
-
-
-@fenced
-def _pair_of_nodes(factor, nodes):
-    sun, view = nodes[:, 0], nodes[:, 1]
-    terms = [
-        view[:, None, k] * sun[None, :, k] + sun[:, None, k] * view[None, :, k]
-        for k in range(nodes.shape[2])
-    ]
-    return 0.5 * factor * total(terms)
+def pair(
+    factor: float,
+    fields: Sequence[Fields],
+    weight: float | Float[Array, "*batch"] = 0.0,
+    more: Bordered | None = None,
+) -> Bordered:
+    """Cotangent ``factor (pair(F) + ... + weight more)`` of all `fields`."""
+    core = _pairs_of_nodes(factor, [x.nodes for x in fields], weight, more and more.core)
+    return Bordered(core, *_pairs_with_beams(factor, fields, weight, more and edge(more)))
 
 
 @fenced
-def _pair_with_beams(factor, fields):
-    nodes, own, other = fields
-    pairs = range(own.shape[1])
-    border = total([swapped(nodes)[:, :, k] * own[:, k] for k in pairs])
-    diagonal = total([other[::-1, k] * own[:, k] for k in pairs])
-    corner = total([own[:1, k] * own[1:, k] for k in pairs])
-    return factor * border, factor * diagonal, factor * corner
+def _pairs_of_nodes(factor, nodes, weight, more):
+    terms = [_outer(x[:, 1], x[:, 0]) + _outer(x[:, 0], x[:, 1]) for x in nodes]
+    half = 0.5 * total(terms)
+    return factor * (half if more is None else half + weight * more)
+
+
+def _outer(x, y):
+    return x[:, None] * y[None]
+
+
+@fenced
+def _pairs_with_beams(factor, fields, weight, more):
+    border = total([swapped(x.nodes) * x.own for x in fields])
+    diagonal = total([x.other[::-1] * x.own for x in fields])
+    corner = total([x.own[:1] * x.own[1:] for x in fields])
+    sums = border, diagonal, corner
+    if more is not None:
+        sums = (x + weight * y for x, y in zip(sums, more, strict=True))
+    return tuple(factor * x for x in sums)
+
+
+def cotangents(
+    mean: Fields, drop: Fields, steps: Sequence[tuple[Action, Float[Array, "*batch"]]]
+) -> tuple[Bordered, Bordered]:
+    r"""P and Q of a part of a layer from mean and drop across the layer (`mode_slopes`).
+
+    Parameters
+    ----------
+    mean, drop
+        :math:`\sigma` and N.
+    steps
+        Quotient R and half thickness h before each doubling that is undone, the last one first.
+
+    The halves of a doubling see the fields :math:`\sigma - hR\sigma \pm hN/2` and
+    :math:`N \pm 2R\sigma`. As pair(x + y) + pair(x - y) = 2 pair(x) + 2 pair(y) under everything
+    linear, neither is formed: their two terms take their place and count twice. So the last of n
+    doublings leaves
+
+    .. math::
+       P &= 2^{n+1}\sum [pair(\sigma - hR\sigma) + \tfrac{h^2}{4} pair(N)], \\
+       Q &= 2^{n-1}\sum [pair(N) + 4\, pair(R\sigma)].
+    """
+    means, drops, factor = [mean], [drop], 1.0
+    for n, (quotient, h) in enumerate(steps, start=1):
+        factor *= 2
+        changes = [act(quotient, x) for x in means]
+        means = [advance(x, c, h) for x, c in zip(means, changes, strict=True)]
+        if n == len(steps):
+            both = pair(1.0, drops)
+            y_bar = pair(2 * factor, means, 0.25 * h * h, both)
+            return y_bar, pair(2 * factor, changes, 0.25, both)
+        means += [scaled(0.5 * h, x) for x in drops]
+        drops += [scaled(2.0, c) for c in changes]
+    return pair(2.0, means), pair(0.5, drops)
 
 
 class Side(NamedTuple):
-    """A quotient on one side of a cotangent: core ``V X.c``, border and diagonal with the rest.
+    """A quotient on one side of a cotangent X.
 
-    The symmetric part of ``V X.c + X.b g^T / 2`` is the core of half the sum of both sides.
+    With the quotient's core V and border g the core is ``V X.c + g X.b^T / 2``; its symmetric part
+    is half the sum of both sides. Border and diagonal are twice that.
     """
 
     core: Float[Array, "node node *batch"]
@@ -178,7 +212,8 @@ def side(quotient: Action, x: Bordered) -> Side:
 @fenced
 def side_of_nodes(left, sent, core, border, corner):
     """Core and border of a cotangent with a matrix on one side."""
-    return product(left, core), product(left, border) + swapped(sent) * corner
+    one_side = product(left, core) + 0.5 * product(sent, transpose(border))
+    return one_side, product(left, border) + swapped(sent) * corner
 
 
 @fenced
@@ -189,11 +224,9 @@ def side_of_beams(ratio, over, right, middle, x, driven):
     return beams * over + ratio * x.diagonal
 
 
-def both_sides(core, border, sent, corner, left):
-    """Core with a quotient on both sides, inside a kernel, from that with it on one."""
-    nodes = product(core, transpose(left))
-    border = border - 0.5 * corner * swapped(sent)
-    return nodes + 0.5 * (product(border, transpose(sent)) + product(sent, transpose(border)))
+def both_sides(core, border, sent, left):
+    """Core with a quotient on the other side, too, inside a kernel."""
+    return product(core, transpose(left)) + 0.5 * product(border, transpose(sent))
 
 
 def symmetric(x):

@@ -10,13 +10,13 @@ from jaxtyping import Array, Float
 from .._kernels import one_kernel, small_enough
 from .._numerics import fenced
 from .bordered import Bordered, combined, reciprocal
-from .fields import Action, Feed, Fields, act, advance, feed, pair, split
+from .fields import Action, Feed, Fields, act, advance, cotangents, feed
 from .layer import ModeKernels, conservative, layer_matrix, start_coefficient
 from .pull_back import undo_start, undouble
 from .quotient import Quotient, minus_and_quotient
 
-# Doublings undone by fields: matrices are as fast with few nodes, and faster than many fields.
-_BY_FIELDS, _BY_FIELDS_OF_FEW, _FEW_NODES = 2, 1, 4
+# Doublings undone by fields, and with so few nodes; the rest by matrices. Measured.
+_BY_FIELDS, _BY_FIELDS_OF_FEW, _FEW_NODES = 2, 1, 2
 
 
 class Layer(NamedTuple):
@@ -249,10 +249,10 @@ def descend(
 
     nodes = fields.nodes.shape[0]
     by_fields = min(num_doublings, _BY_FIELDS_OF_FEW if nodes <= _FEW_NODES else _BY_FIELDS)
-    for k in reversed(range(num_doublings - by_fields, num_doublings)):
-        mean, drop = split(mean, drop, act(quotients[k], mean), start * 2.0**k)
-    y_bar, z_bar = pair(2.0, mean), pair(0.5, drop)
-    for k in reversed(range(num_doublings - by_fields)):
+    left = num_doublings - by_fields
+    steps = [(quotients[k], start * 2.0**k) for k in reversed(range(left, num_doublings))]
+    y_bar, z_bar = cotangents(mean, drop, steps)
+    for k in reversed(range(left)):
         y_bar, z_bar = undouble(quotients[k], start * 2.0**k, y_bar, z_bar)
     return below, *undo_start(
         Action(*kept.inner, own.ratios[0], own.overs[0], kept.a, inner),

@@ -12,9 +12,9 @@ below. A doubling with quotient R is undone by
 .. math::
    Q \leftarrow 2Q + 2(R\otimes R)P, \qquad P \leftarrow 2P - 2h(R\oplus R)P + h^2Q,
 
-or, as long as pairs of fields are fewer than nodes, by splitting a pair into two,
-:math:`\sigma \leftarrow \sigma - hR\sigma \pm hN/2`, :math:`N \leftarrow N \pm 2R\sigma`. At the
-start (`layer.half_layer`), with :math:`U = Z^{-1}A`, :math:`W = Z^{-1}C`,
+or, as long as fields are fewer than nodes, by those of its halves,
+:math:`\sigma - hR\sigma \pm hN/2` and :math:`N \pm 2R\sigma` (`fields.cotangents`). At the start
+(`layer.half_layer`), with :math:`U = Z^{-1}A`, :math:`W = Z^{-1}C`,
 :math:`V = (5B^{-1} + dh^2A)^{-1}A` and :math:`M = (U\otimes W + W\otimes U)P/2`,
 
 .. math::
@@ -123,7 +123,11 @@ def mode_slopes(
         )
     )
     if kept is None:
-        kept = jax.tree.map(lambda x: jnp.zeros((numbers.size, x.size), x.dtype), shapes)
+        # A number of its own in each: arrays of zeros would be one for XLA, and copied.
+        leaves, structure = jax.tree.flatten(shapes)
+        kept = structure.unflatten(
+            jnp.full((numbers.size, x.size), float(k), x.dtype) for k, x in enumerate(leaves)
+        )
     (stack, kept), _ = jax.lax.scan(up, (ground, kept), numbers, reverse=True)
     reflection, fields = _fields_at_the_top(stack, weight)
 
@@ -161,7 +165,7 @@ def mode_slopes(
     start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
     carry, _ = jax.lax.scan(down, (fields, start, slopes.layers), numbers)
     fields, (even, odd, view), layers = carry
-    return reflection, kept, Slopes(Shared(layers, view), even, odd, pair(1.0, fields))
+    return reflection, kept, Slopes(Shared(layers, view), even, odd, pair(1.0, [fields]))
 
 
 def _in_blocks(x: Any) -> bool:
@@ -194,8 +198,7 @@ def _fields_at_the_top(stack: Bordered, weight):
     solved = matmul(top(stack).inverse, stack.border)
     reflection = 0.5 * (jnp.sum(stack.border[:, 1] * solved[:, 0], axis=0) - stack.corner[0])
     scale = jnp.stack([jnp.ones_like(weight), -0.5 * weight])
-    own = scale[:, None]
-    return reflection, Fields(-(scale * solved)[:, :, None], own, jnp.zeros_like(own))
+    return reflection, Fields(-scale * solved, scale, jnp.zeros_like(scale))
 
 
 @fenced

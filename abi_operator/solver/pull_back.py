@@ -34,10 +34,8 @@ def undouble(
 ) -> tuple[Bordered, Bordered]:
     """Cotangents P and Q before a doubling of the layer's half h from those after it."""
     once = side(quotient, y_bar)
-    z_core = _z_core(
-        z_bar.core, once.core, once.border, quotient.border, y_bar.corner, quotient.core
-    )
-    y_core = _y_core(h, y_bar.core, y_bar.border, once.core, quotient.border, z_core)
+    z_core = _z_core(z_bar.core, once.core, once.border, quotient.border, quotient.core)
+    y_core = _y_core(h, y_bar.core, once.core, z_core)
     z_edge, y_edge = _undouble_edges(
         h, quotient.ratio, once.border, once.diagonal, edge(y_bar), edge(z_bar)
     )
@@ -45,14 +43,13 @@ def undouble(
 
 
 @fenced
-def _z_core(z_core, core, border, sent, corner, left):
-    return 2 * z_core + 2 * both_sides(core, border, sent, corner, left)
+def _z_core(z_core, core, border, sent, left):
+    return 2 * z_core + 2 * both_sides(core, border, sent, left)
 
 
 @fenced
-def _y_core(h, y_core, y_border, once, sent, z_core):
-    one_side = 2 * once + product(y_border, transpose(sent))
-    return 2 * y_core - 2 * h * symmetric(one_side) + h * h * z_core
+def _y_core(h, y_core, once, z_core):
+    return 2 * y_core - 4 * h * symmetric(once) + h * h * z_core
 
 
 def _twice(ratio, border, diagonal, x: Edge):
@@ -90,33 +87,21 @@ def undo_start(
     W = U (1/3 - h^2 V / 9), and the two commute: W's products follow from U's by one with V.
     """
     u = side(by_a, y_bar)
-    sent_w, w_core, w_border = _chained(
-        square / 9, inner.core, inner.border, inner.ratio, by_a.core, by_a.border, u, y_bar.corner
+    w_core, w_border = _chained(
+        square / 9, inner.core, inner.border, by_a.ratio, u[:2], y_bar.border, y_bar.corner
     )
     w_diagonal = side_of_beams(ratio_w, by_a.over, fraction, by_a.middle, edge(y_bar), w_border)
     w = Side(w_core, w_border, w_diagonal)
-    mixed = _mixed_core(u, w, by_a.border, sent_w, by_a.core, y_bar.corner)
-    z_core = _start_z_core(square, z_bar.core, u.core, y_bar.border, by_a.border, mixed)
+    mixed = _both_sides(w.core, w.border, by_a.border, by_a.core)
+    z_core = _start_z_core(square, z_bar.core, u.core, mixed)
     z_edge, p_edge = _start_z_edge(
         square, u[1:], w[1:], by_a.ratio, ratio_w, edge(y_bar), edge(z_bar)
     )
     z = Bordered(z_core, *z_edge)
     v = side(inner, z)
-    twice = _twice_core(v.core, v.border, inner.border, z.corner, inner.core)
+    twice = _both_sides(v.core, v.border, inner.border, inner.core)
     a_core, p_core = _start_cores(
-        square,
-        d,
-        y_bar.core,
-        y_bar.border,
-        w.core,
-        sent_w,
-        z.core,
-        z.border,
-        v.core,
-        inner.border,
-        twice,
-        z_bar.core,
-        mixed,
+        square, d, y_bar.core, w.core, z.core, v.core, twice, z_bar.core, mixed
     )
     a_edge, p_edge = _start_edges(
         square, d, edge(y_bar), w[1:], ratio_w, edge(z), v[1:], inner.ratio, p_edge
@@ -124,28 +109,22 @@ def undo_start(
     return Bordered(a_core, *a_edge), Bordered(p_core, *p_edge)
 
 
-@fenced
-def _chained(ninth, v, sent_v, ratio_v, u, sent_u, by_u, corner):
-    """What W sends, and its products from those of U."""
-    sent = sent_u / 3 - ninth * (product(u, sent_v) + sent_u * ratio_v)
-    nodes = by_u.border - swapped(sent_u) * corner
-    border = nodes / 3 - ninth * product(v, nodes) + swapped(sent) * corner
-    return sent, by_u.core / 3 - ninth * product(v, by_u.core), border
+_both_sides = fenced(both_sides)
 
 
 @fenced
-def _mixed_core(u, w, sent_u, sent_w, left_u, corner):
-    nodes = product(w.core, transpose(left_u))
-    from_u = u.border - 0.5 * corner * swapped(sent_u)
-    from_w = w.border - 0.5 * corner * swapped(sent_w)
-    rows = product(from_u, transpose(sent_w)) + product(from_w, transpose(sent_u))
-    return nodes + 0.5 * rows
+def _chained(ninth, v, sent_v, ratio_u, with_u, x_border, corner):
+    """Core and border with W on one side from those with U."""
+    core, border = with_u
+    sent = sent_v * ratio_u
+    both = product(v, core) + 0.5 * product(sent, transpose(x_border))
+    driven = product(v, border) + swapped(sent) * corner
+    return core / 3 - ninth * both, border / 3 - ninth * driven
 
 
 @fenced
-def _start_z_core(square, z_core, u, border, sent, mixed):
-    one_side = u + 0.5 * product(border, transpose(sent))
-    return z_core + symmetric(square * mixed - one_side)
+def _start_z_core(square, z_core, u, mixed):
+    return z_core + symmetric(square * mixed - u)
 
 
 @fenced
@@ -161,15 +140,10 @@ def _start_z_edge(square, u, w, ratio_u, ratio_w, y_bar, z_bar):
     return Edge(*(x - 0.5 * e for x, e in zip(p, each, strict=True))), p
 
 
-_twice_core = fenced(both_sides)
-
-
 @fenced
-def _start_cores(square, d, y, y_border, w, sent_w, z, z_border, v, sent_v, twice, z_bar, mixed):
-    one_w = w + 0.5 * product(y_border, transpose(sent_w))
-    each_v = 2 * v + product(z_border, transpose(sent_v))
+def _start_cores(square, d, y, w, z, v, twice, z_bar, mixed):
     quartic = square * square
-    a = y + square * (z / 3 - one_w) - quartic / 9 * (each_v - d * square * twice)
+    a = y + square * (z / 3 - w) - quartic / 9 * (2 * v - d * square * twice)
     return a, z_bar + square * mixed + (5 / 9) * quartic * twice
 
 

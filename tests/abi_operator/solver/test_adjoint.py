@@ -102,7 +102,7 @@ def value_and_slopes(function, x, *args, **how):
         (2, 0, True, False),
         (2, 3, False, True),
         (4, 3, True, True),
-        (6, 1, False, False),
+        (6, 3, False, False),
         pytest.param(4, 0, False, False, marks=pytest.mark.slow),
         pytest.param(8, 3, True, False, marks=pytest.mark.slow),
         pytest.param(8, 1, False, True, marks=pytest.mark.slow),
