@@ -31,20 +31,25 @@ COMPILE_STREAMS, COMPILE_SECONDS = 16, {"value": 20, "value + gradient": 40}
 COPIES = 6
 
 
-def both(num_streams):
-    settings = {"num_streams": num_streams, "num_doublings": workload.num_doublings(num_streams)}
+def both(num_streams, num_doublings):
+    settings = {"num_streams": num_streams, "num_doublings": num_doublings}
     return {
         "value": Program(workload.value(settings)),
         "value + gradient": Program(workload.gradient(settings)),
     }
 
 
-def sweep(rounds: Rounds, label, cases, bars):
-    """One row a case (label, streams, layers, columns, dtype); returns microseconds a column."""
+def sweep(rounds: Rounds, label, cases, bars, more=0):
+    """One row a case (label, streams, layers, columns, dtype); returns microseconds a column.
+
+    `more`: doublings beyond those of the main table.
+    """
     found, rows = {}, []
     for case, n, layers, count, dtype in cases:
-        t = rounds.run(both(n), n, layers, count, ["nanodisort"], dtype=dtype)
-        row, error = [case, workload.num_doublings(n)], {}
+        num_doublings = workload.num_doublings(n) + more
+        programs = both(n, num_doublings)
+        t = rounds.run(programs, n, layers, count, ["nanodisort"], dtype=dtype)
+        row, error = [case, num_doublings], {}
         for name in ("value", "value + gradient"):
             row += [digits(t[name].microseconds), t[name].spread]
             error[name] = apart(t[name].brf, t["nanodisort"].brf)
@@ -75,10 +80,11 @@ def batch(rounds, options, bars):
 
 
 def layers(rounds, options, bars):
+    """With a doubling more: the fewer the layers, the more the thick one's error weighs."""
     for n in options.sweep_streams or USUAL_STREAMS:
         print(f"Layers, {n} streams, {options.columns} columns:\n")
         cases = [(k, n, k, options.columns, np.float64) for k in LAYERS]
-        found = sweep(rounds, "layers", cases, bars)
+        found = sweep(rounds, "layers", cases, bars, more=1)
         for name in ("value", "value + gradient"):
             growth = max(found[k, name] / k for k in LAYERS if k > FEW_LAYERS)
             growth /= found[FEW_LAYERS, name] / FEW_LAYERS
@@ -119,7 +125,7 @@ def derivatives(rounds, options, bars):
         def whole(given, _):
             return (given,)
 
-        programs = both(n) | {
+        programs = both(n, workload.num_doublings(n)) | {
             "value, vmapped": Program(workload.mapped_value(settings)),
             "value + gradient, vmapped": Program(workload.mapped_gradient(settings)),
             "value of 3 views": Program(workload.view_value(settings), workload.view_arguments),
@@ -231,7 +237,7 @@ def main():
     name, *sizes = sys.argv[1:]
     num_streams, count, num_layers = map(int, sizes)
     workload.use_all_cores()
-    program, seconds = both(num_streams)[name].call, []
+    program, seconds = both(num_streams, workload.num_doublings(num_streams))[name].call, []
     # The second call's peak counts: with the first one's arguments gone, and compiled.
     for seed in range(2):
         arrays = prepared(seed, num_streams, count, num_layers)
