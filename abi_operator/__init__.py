@@ -6,7 +6,8 @@ imager would see in each band: `reflectance_factor` or `brf` of sunlight, `radia
 shines too. Exact derivatives with respect to everything in the state come by `jax.jacfwd`,
 `jax.jacrev` and `jax.grad`. `abi_operator.solver` is the radiative transfer on its own;
 `abi_operator.instrument` makes of radiances what a file would hold; `abi_operator.files` and
-`abi_operator.scene` turn model output on disk into images.
+`abi_operator.scene` turn model output on disk into images. `use_full_speed` is for programs of your
+own, under `jax.jit`, and `use_compilation_cache` compiles them once and not in every process.
 """
 
 from ._version import __version__ as __version__
@@ -31,5 +32,7 @@ from .radiance import brightness_temperature as brightness_temperature
 from .radiance import radiance as radiance
 from .reflectance import brf as brf
 from .reflectance import reflectance_factor as reflectance_factor
+from .speed import use_compilation_cache as use_compilation_cache
+from .speed import use_full_speed as use_full_speed
 from .standard_atmospheres import standard_atmosphere as standard_atmosphere
 from .state_checks import check_state as check_state

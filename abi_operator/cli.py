@@ -4,8 +4,13 @@ Inputs are opened and checked before a folder is made; what is wrong with one of
 one sentence, with exit code 2. Other packages add commands of their own by entry points of the
 group ``abi_operator.commands``; the entry named ``demo`` is called at the end of the demonstration
 with the folder that holds its result.
+
+All commands run in float64, with the processor's widest vectors, and keep what they compile
+(``--no-cache``). Every usable core works without being told: the operator cuts its columns among
+threads, and so do the retrievals. More CPU devices of JAX would do nothing for either.
 """
 
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,6 +31,7 @@ from .optics import ALL_GASES
 from .satellites import SATELLITES
 from .scene import CLASSES
 from .simulation import Report, Request, Species, open_scene, simulate_scene
+from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_widest_vectors
 from .surface import EMISSIVITY_3900NM
 
 COMMANDS = "abi_operator.commands"
@@ -35,6 +41,8 @@ COMMANDS = "abi_operator.commands"
 _DEMO_OCEAN_ALBEDO = 0.03
 
 _ALL, _NONE = "all", "none"
+_NO_CACHE = "--no-cache"
+_NO_CACHE_HELP = "Use and keep no compiled programs; also behind a command's name."
 _IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
 
 
@@ -53,6 +61,8 @@ def _print(report: Report, out: Path) -> None:
         typer.echo(f"wrote {out / name}")
     for line in report.lines:
         typer.echo(line)
+    cores = usable_cores()
+    typer.echo(f"computed on {cores} core{'s' if cores > 1 else ''}")
 
 
 def simulate(
@@ -186,16 +196,31 @@ def _load(entry: EntryPoint) -> Callable[..., Any] | None:
         return None
 
 
-def make_app() -> typer.Typer:
-    """Build the command line with our commands and those of other packages."""
+def make_app(prepare: Callable[[bool], None] = lambda keep_programs: None) -> typer.Typer:
+    """Build the command line with our commands and those of other packages.
+
+    Parameters
+    ----------
+    prepare
+        Called before any command, with whether it may keep what it compiles.
+    """
     app = typer.Typer(
-        help="Differentiable synthetic imagery of the GOES-R Advanced Baseline Imager.",
+        help="Differentiable synthetic imagery of the GOES-R Advanced Baseline Imager."
+        f"\n\n\b\nCompiled programs are kept for the next command in\n{_cache_folder()}",
         no_args_is_help=True,
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
     )
-    app.callback()(_in_double_precision)
+
+    @app.callback()
+    def before_every_command(  # pyright: ignore[reportUnusedFunction]
+        context: typer.Context,
+        no_cache: Annotated[bool, typer.Option(_NO_CACHE, help=_NO_CACHE_HELP)] = False,
+    ) -> None:
+        prepare(not no_cache)
+        context.with_resource(jax.enable_x64(True))
+
     app.command()(simulate)
     app.command()(demo)
     app.add_typer(jacobian, name="jacobian")
@@ -206,11 +231,26 @@ def make_app() -> typer.Typer:
     return app
 
 
-def _in_double_precision(context: typer.Context) -> None:
-    """Run every command in float64."""
-    context.with_resource(jax.enable_x64(True))
+def _cache_folder() -> str:
+    try:
+        return str(default_cache_folder())
+    except RuntimeError:
+        return "the user's cache folder"
+
+
+def _prepare_process(keep_programs: bool) -> None:
+    """Settle what a process of our own computes with, before JAX starts."""
+    use_widest_vectors()
+    if not keep_programs:
+        jax.config.update("jax_enable_compilation_cache", False)
+    with _user_warnings():
+        use_compilation_cache()
 
 
 def main() -> None:
-    """Run the command line."""
-    make_app()()
+    """Run the command line, in a process of its own."""
+    words = sys.argv[1:]
+    # An option of all commands, which may stand behind the name of one as well.
+    if _NO_CACHE in words:
+        words = [_NO_CACHE, *(word for word in words if word != _NO_CACHE)]
+    make_app(_prepare_process)(words)

@@ -11,8 +11,13 @@ Extinction has a leading axis ``term``, over which radiances are summed with `we
 exponentials of a band's gas transmission. Grey matter has one term of weight 1.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ._numerics import safe_divide
@@ -89,19 +94,33 @@ class OpticalProperties(eqx.Module):
 
     def moments(self, num_moments: int) -> Float[Array, "layer moment"]:
         """Legendre moments of the mixture, weighted by scattering; 1, 0, 0, ... where none. [-]"""
-        scattering = self.scattering
-        mixed = sum(
-            (s.scattering[:, None] * s.phase.moments(num_moments)[:, 1:] for s in self.scatterers),
-            jnp.zeros((scattering.shape[0], num_moments - 1), scattering.dtype),
-        )
-        higher = safe_divide(mixed, scattering[:, None])
-        return jnp.concatenate([jnp.ones_like(scattering)[:, None], higher], axis=1)
+        shape = self.extinction.shape[1], num_moments
+
+        def of_kind(shares: Array, phase: PhaseFunction) -> Array:
+            return shares[:, None] * jnp.broadcast_to(phase.moments(num_moments), shape)
+
+        return jnp.where(np.arange(num_moments) == 0, 1, self._mean(of_kind))
 
     def phase_function(self, cos_scattering: Float[Array, ""]) -> Float[Array, " layer"]:
         """Phase function of the mixture, weighted by scattering; 0 where nothing scatters. [-]"""
+
+        def of_kind(shares: Array, phase: PhaseFunction) -> Array:
+            return shares * phase(cos_scattering)
+
+        return self._mean(of_kind)
+
+    def _mean(self, of_kind: Callable[[Array, PhaseFunction], Array]) -> Array:
+        """Sum over the scatterers by their shares; what differs in numbers only is one batch."""
         scattering = self.scattering
-        mixed = sum(
-            (s.scattering * s.phase(cos_scattering) for s in self.scatterers),
-            jnp.zeros_like(scattering),
-        )
-        return safe_divide(mixed, scattering)
+        inverse = safe_divide(jnp.ones_like(scattering), scattering)
+        kinds: dict[Any, list[Scatterer]] = {}
+        for scatterer in self.scatterers:
+            kinds.setdefault(jax.tree.structure(scatterer.phase), []).append(scatterer)
+        found = []
+        for same in kinds.values():
+            shares = jnp.stack([s.scattering * inverse for s in same])
+            phases = jax.tree.map(
+                lambda *x: jnp.stack(jnp.broadcast_arrays(*x)), *(s.phase for s in same)
+            )
+            found += jnp.unstack(jax.vmap(of_kind)(shares, phases))
+        return sum(found[1:], start=found[0])

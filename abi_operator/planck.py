@@ -19,6 +19,7 @@ References
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .bands import AnyName, constants
 from .satellites import planck_coefficients
 
 
@@ -42,7 +43,7 @@ def wavenumber_radiance_factor(band_name: str, satellite: str = "GOES-16") -> fl
 
 
 def in_band_radiance(
-    temperature: Float[Array, "*shape"], band_name: str, satellite: str = "GOES-16"
+    temperature: Float[Array, "*shape"], band_name: AnyName, satellite: str = "GOES-16"
 ) -> Float[Array, "*shape"]:
     """Radiance of a black body averaged over the response of a band. [W m-2 sr-1 um-1]
 
@@ -62,7 +63,9 @@ def in_band_radiance(
     ValueError
         Where emission in the band is negligible, or band or satellite are unknown.
     """
-    fk1, fk2, bc1, bc2, factor = planck_coefficients(band_name, satellite)
+    fk1, fk2, bc1, bc2, factor = constants(
+        lambda name: planck_coefficients(name, satellite), band_name, temperature.dtype
+    )
     # In exp(-x) nothing overflows: exp(x), and its square in the derivative, would in float32.
     x = fk2 / (bc1 + bc2 * temperature)
     return factor * fk1 * jnp.exp(-x) / -jnp.expm1(-x)

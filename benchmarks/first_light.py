@@ -9,7 +9,6 @@ brf of 128 columns of the same scene against 32 streams.
 """
 
 import argparse
-import os
 import platform
 import statistics
 import sys
@@ -29,6 +28,7 @@ from abi_operator.pictures import write_png
 from abi_operator.products import natural_color
 from abi_operator.scene import PlumeSpecification, column_states, scenario, simulate
 from abi_operator.solver import cos_scattering_angle, toa_brf
+from abi_operator.speed import usable_cores
 
 OCEAN_ALBEDO = 0.03
 REFERENCE_STREAMS = 32
@@ -128,7 +128,7 @@ def main():
     print(
         f"abi-operator {__version__}, jax {jax.__version__}, {jax.devices()[0].platform}, ", end=""
     )
-    print(f"{platform.machine()}, {os.cpu_count()} cores, Python {sys.version.split()[0]}, float64")
+    print(f"{platform.machine()}, {usable_cores()} cores, Python {sys.version.split()[0]}, float64")
     print(
         f"{options.size} x {options.size} columns x {len(GRASSO2013)} bands, "
         f"{layers_count} layers, ",

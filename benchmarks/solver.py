@@ -6,6 +6,7 @@ times the value (`toa_brf`), the value with its gradient in every argument, and 
 that is installed (extra `benchmark`), in rounds in which each has its turn on columns that no round
 before had. Beside the time stands the error of those very calls. `--sweep` (see --help) measures
 against batch, layers, streams or precision, memory and compiling, Jacobians and `jax.vmap`.
+`--plain` times a user's script without any setting instead, beside a process tuned by hand.
 `--check` judges all that was measured and exits with 1 where a bar is missed.
 """
 
@@ -16,6 +17,7 @@ from dataclasses import replace
 
 import jax
 import numpy as np
+import plain
 import solver_sweeps
 import workload
 from peers import MEASURED_STREAMS, NUM_MOMENTS, PEERS, Peers, peer_version, usable_peers
@@ -23,6 +25,7 @@ from rounds import AGREE, Bars, Program, Rounds, apart, digits, relative, table
 
 from abi_operator import __version__
 from abi_operator.solver import double_gauss
+from abi_operator.speed import usable_cores
 
 TRUE_STREAMS = 64
 PEER_SHARE = 0.8  # of its earlier rate relative to nanodisort's, or the comparison is unfair
@@ -174,23 +177,28 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--columns", type=int, default=1000)
+    parser.add_argument("--columns", type=int, help="default: 1,000, with --plain 2,048")
     parser.add_argument("--layers", type=int, default=20)
-    parser.add_argument("--streams", type=int, nargs="+", default=[4, 8, 16, 32])
+    parser.add_argument("--streams", type=int, nargs="+", help="default: 4 8 16, and 32")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=2.0, help="most of a slow peer's call")
     parser.add_argument("--truth", type=int, default=32, help="columns a round with 64 streams")
     parser.add_argument("--series", action="store_true", help="ours sums 129 moments as well")
     parser.add_argument("--sweep", nargs="+", default=[], choices=["main", *solver_sweeps.SWEEPS])
+    parser.add_argument("--plain", action="store_true", help="calls of a script without settings")
     parser.add_argument("--sweep-streams", type=int, nargs="+", help="default: 8 and 16, or all")
     parser.add_argument("--largest", type=int, default=100_000, help="batch of the sweeps")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
-    cores = workload.use_all_cores()
+    options.columns = options.columns or (plain.COLUMNS if options.plain else 1000)
+    options.streams = options.streams or [*plain.STREAMS, *([] if options.plain else [32])]
+    # A process that times plain calls leaves JAX alone: its children have one each.
+    cores = usable_cores() if options.plain else workload.use_all_cores()
     found = {name: peer_version(name) or "MISSING" for name in PEERS}
     versions = ", ".join(f"{k} {v}" for k, v in found.items() if "+" not in k)
     print(f"abi-operator {__version__}, jax {jax.__version__}, {versions}")
-    print(f"{jax.devices()[0].device_kind}, {platform.machine()}, {cores} cores used by every")
+    device = "cpu" if options.plain else jax.devices()[0].device_kind
+    print(f"{device}, {platform.machine()}, {cores} cores used by every")
     print(
         f"solver, Python {sys.version.split()[0]}, float64, {options.layers} layers\n", flush=True
     )
@@ -203,11 +211,13 @@ def main():
         sys.exit('The reference is missing: pip install "abi-operator[benchmark]".')
     with Peers(cores, max(options.columns, 16), max(60, options.layers)) as peers:
         rounds = Rounds(peers, options.repeats, options.seconds)
-        if not options.sweep or "main" in options.sweep:
+        if options.plain:
+            plain.plain(peers, options, bars)
+        elif not options.sweep or "main" in options.sweep:
             agreement(peers, options.streams, bars)
             main_table(rounds, options, bars)
         for name in options.sweep:
-            if name != "main":
+            if name != "main" and not options.plain:
                 solver_sweeps.SWEEPS[name](rounds, options, bars)
     bars.report()
     sys.exit(1 if options.check and bars.failed else 0)

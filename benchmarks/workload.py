@@ -15,11 +15,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from abi_operator.solver import (
-    cos_scattering_angle,
-    double_gauss,
-    toa_brf,
-)
+from abi_operator import use_full_speed
+from abi_operator.solver import cos_scattering_angle, double_gauss, toa_brf
 
 MAX_TAU, MIN_MU, MAX_MU = 30.0, 0.2, 0.95
 MOST_STREAMS = 64
@@ -92,22 +89,20 @@ def num_doublings(num_streams):
 
 
 def use_all_cores():
-    """Float64, a CPU device of JAX for each core that the command may use, and full vectors.
+    """Float64, and full speed for programs under `jax.jit`, tuned by hand.
 
     Threads of XLA stay each on a core, as the processes of the other solvers do: after a pause
     Linux often wakes two on one core, and takes longer to part them than a call lasts.
     """
-    cores = sorted(os.sched_getaffinity(0))
-    flags = os.environ.get("XLA_FLAGS", "")
-    os.environ["XLA_FLAGS"] = f"--xla_cpu_prefer_vector_width=512 {flags}"
     jax.config.update("jax_enable_x64", True)
-    jax.config.update("jax_num_cpu_devices", len(cores))
+    found = use_full_speed()
     jax.block_until_ready(jax.numpy.zeros(1) + 1)
+    cores = sorted(os.sched_getaffinity(0))
     threads = [int(x.name) for x in Path("/proc/self/task").iterdir()]
     workers = [t for t in threads if "XLAEigen" in Path(f"/proc/{t}/comm").read_text()]
     for k, thread in enumerate(sorted(workers)):
         os.sched_setaffinity(thread, {cores[k % len(cores)]})
-    return len(cores)
+    return found.cores
 
 
 def arguments(given: Columns, num_streams, dtype=np.float64, series=None):

@@ -1,6 +1,5 @@
 """Many pixels, a chunk at a time and on every core."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -9,6 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
+
+from abi_operator.speed import usable_cores
 
 T = TypeVar("T")
 
@@ -48,6 +49,6 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUN
             return jax.tree.map(np.asarray, result)
 
     first = solve(starts[0])  # compiles
-    with ThreadPoolExecutor(os.cpu_count()) as pool:  # JAX computes without Python's global lock
+    with ThreadPoolExecutor(usable_cores()) as pool:  # JAX computes without Python's global lock
         others = list(pool.map(solve, starts[1:]))
     return jax.tree.map(lambda *parts: np.concatenate(parts)[:num_pixels], first, *others)

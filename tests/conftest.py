@@ -1,6 +1,8 @@
 """Precision and strictness under which every test runs."""
 
 import os
+import shutil
+import tempfile
 
 import jax
 import pytest
@@ -8,6 +10,25 @@ import pytest
 if "JAX_ENABLE_X64" not in os.environ:
     jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+# What one worker compiled the others read, and the processes that tests start. [s]
+_CACHE, _SHORTEST_COMPILATION = "JAX_COMPILATION_CACHE_DIR", 0.0
+
+
+def pytest_configure(config):
+    """One cache of compiled programs for all workers of a run, emptied at its end."""
+    if _CACHE not in os.environ:
+        config.own_cache = tempfile.mkdtemp(prefix="abi-operator-tests-")
+        os.environ[_CACHE] = config.own_cache
+    jax.config.update("jax_compilation_cache_dir", os.environ[_CACHE])
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", _SHORTEST_COMPILATION)
+
+
+def pytest_unconfigure(config):
+    """Remove it, in the process that made it."""
+    if hasattr(config, "own_cache"):
+        shutil.rmtree(config.own_cache, ignore_errors=True)
+        os.environ.pop(_CACHE, None)
 
 
 def pytest_addoption(parser):

@@ -1,5 +1,6 @@
 """Specified columns for tests of the operator and of what stands on it."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -20,3 +21,8 @@ def column(liquid=0.05, smoke_aod=0.8, ash_aod=0.0, albedo=0.1, num_layers=12):
         {name: albedo for name in GRASSO2013},
         Geometry(jnp.asarray(0.6), jnp.asarray(0.8), jnp.asarray(1.2)),
     )
+
+
+def stacked(states):
+    """States of one structure as a batch of them."""
+    return jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *states)

@@ -14,13 +14,24 @@ FLOORS = [
     {"files", "instrument", "pictures", "products"},
     {"quality", "radiance", "reflectance"},
     {"optics_and_solver", "state_checks"},
+    {"bands_of_states"},
     {"band_columns"},
     {"optics", "solver", "surface"},
     {"microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
     {"geometry", "planck"},
-    {"satellites", "_elimination"},
-    {"_batching", "_kernels", "_numerics", "_version", "bands", "constants", "nomenclature"},
+    {"satellites", "_door", "_elimination"},
+    {"_chunks", "speed"},
+    {
+        "_batching",
+        "_kernels",
+        "_processor",
+        "_numerics",
+        "_version",
+        "bands",
+        "constants",
+        "nomenclature",
+    },
 ]
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 

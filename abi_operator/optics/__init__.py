@@ -16,6 +16,7 @@ from .droplets import effective_radius as effective_radius
 from .gamma import Habit as Habit
 from .gas import ALL_GASES as ALL_GASES
 from .gas import gas_absorption as gas_absorption
+from .gas import num_terms as num_terms
 from .gas import transmittance as transmittance
 from .hydrometeor import CLASSES as CLASSES
 from .hydrometeor import HABITS as HABITS

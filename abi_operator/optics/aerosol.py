@@ -4,7 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..atmosphere import Atmosphere, MiePlume, Plume
-from ..bands import Band
+from ..bands import AnyBand, entry, first_missing
 from ..optical_properties import OpticalProperties, Scatterer
 from .mie_aerosol import mie_optics
 from .mie_phase import MiePhase
@@ -34,7 +34,7 @@ def overlap(
     return -jnp.diff(clipped)
 
 
-def aerosol(atmosphere: Atmosphere, plume: str, band: Band) -> OpticalProperties:
+def aerosol(atmosphere: Atmosphere, plume: str, band: AnyBand) -> OpticalProperties:
     r"""Optical properties of one plume.
 
     .. math:: \tau_k = b\, \beta_{550}\, r_\mathrm{band}\, h_k
@@ -77,16 +77,16 @@ def aerosol(atmosphere: Atmosphere, plume: str, band: Band) -> OpticalProperties
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 
-def _specified(properties: Plume, plume: str, band: Band) -> tuple[Array, Array, Array]:
+def _specified(properties: Plume, plume: str, band: AnyBand) -> tuple[Array, Array, Array]:
     """Relative extinction, single-scattering albedo and asymmetry factor in a band. [-]"""
     values = []
     for name in ("relative_extinction", "ssa", "asymmetry"):
         by_band = getattr(properties, name)
-        if band.name not in by_band:
+        if missing := first_missing(band.name, by_band):
             raise ValueError(
-                f"{name} of plume {plume!r} is not specified in band {band.name!r}, only in "
+                f"{name} of plume {plume!r} is not specified in band {missing!r}, only in "
                 f"{sorted(by_band)}."
             )
-        values.append(by_band[band.name])
+        values.append(entry(by_band, band.name))
     relative_extinction, ssa, asymmetry = values
     return relative_extinction, ssa, asymmetry

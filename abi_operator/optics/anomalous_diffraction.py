@@ -56,6 +56,29 @@ class Corrections(NamedTuple):
     tunnelling_decay: float  # epsilon
 
 
+class Matter(NamedTuple):
+    """What the formulas need to know of one refractive index n - ik.
+
+    Parameters
+    ----------
+    phase_lag, absorption
+        n - 1, which may be negative, and k. [-]
+    modulus, angle
+        Of w / (2 pi u) = k + i (n - 1). [-], [rad]
+    cos_twice
+        Cosine of twice the angle. [-]
+    corrections
+        Those of spheres.
+    """
+
+    phase_lag: float | Array
+    absorption: float | Array
+    modulus: float | Array
+    angle: float | Array
+    cos_twice: float | Array
+    corrections: Corrections
+
+
 def corrections(refractive_index: complex) -> Corrections:
     """Coefficients a1, a2 and epsilon of spheres of refractive index n - ik."""
     n, k = refractive_index.real, -refractive_index.imag
@@ -69,10 +92,18 @@ def corrections(refractive_index: complex) -> Corrections:
     )
 
 
+def matter(refractive_index: complex) -> Matter:
+    """Matter of refractive index n - ik, with k of 0 or more. [-]"""
+    lag, k = refractive_index.real - 1, -refractive_index.imag
+    angle = math.atan2(lag, k)
+    modulus = math.hypot(k, lag)
+    return Matter(lag, k, modulus, angle, math.cos(2 * angle), corrections(refractive_index))
+
+
 def mean_efficiencies(
     effective_radius_um: Float[Array, "*n"],
-    wavelength_um: float,
-    refractive_index: complex,
+    wavelength_um: float | Float[Array, ""],
+    of: Matter,
     nu: float | Array,
     *,
     internal_reflection: float | Array | None = None,
@@ -86,8 +117,8 @@ def mean_efficiencies(
         Effective radius of the gamma distribution, above 0. [um]
     wavelength_um
         Wavelength. [um]
-    refractive_index
-        n - ik, with k of 0 or more. [-]
+    of
+        What the droplets are made of.
     nu
         Shape of the gamma distribution of diameters. [-]
     internal_reflection
@@ -96,21 +127,21 @@ def mean_efficiencies(
         Tunnelling relative to that of spheres, less than 1 for crystals. [-]
     """
     scale = effective_radius_um * (2 / ((nu + 3) * wavelength_um))
-    absorption = scale * (8 * math.pi * -refractive_index.imag / 3)
-    a1, a2, epsilon = corrections(refractive_index)
+    absorption = scale * (8 * math.pi / 3 * of.absorption)
+    a1, a2, epsilon = of.corrections
     a1 = a1 if internal_reflection is None else internal_reflection
     decay, tunnelling = epsilon * scale, tunnelling_factor * (a2 * jnp.sqrt(scale))
 
     q_abs = (
-        _mean_loss(0.0, jnp.zeros_like(scale), absorption, nu)
+        _mean_loss(0.0, None, absorption, nu)
         + a1 * _mean_loss(0.0, absorption, absorption, nu)
         + tunnelling * _mean_loss(0.5, decay, absorption, nu)
     )
-    edge = EDGE * (math.pi * scale) ** (-2 / 3)
+    edge = EDGE * jnp.exp(-2 / 3 * jnp.log(math.pi * scale))
     q_ext = (
-        4 * _mean_diffraction(0.0, jnp.zeros_like(scale), scale, refractive_index, nu)
-        + 2 * tunnelling * _mean_diffraction(0.5, decay, scale, refractive_index, nu)
-        + edge * _mean_loss(-2 / 3, jnp.zeros_like(scale), EDGE_RATE * math.pi * scale, nu)
+        4 * _mean_diffraction(0.0, None, scale, of, nu)
+        + 2 * tunnelling * _mean_diffraction(0.5, decay, scale, of, nu)
+        + edge * _mean_loss(-2 / 3, None, EDGE_RATE * math.pi * scale, nu)
     )
     return q_ext, q_abs
 
@@ -121,21 +152,25 @@ def _gamma_ratio(q: float, nu: float | Array) -> float | Array:
     return math.exp(log_ratio) if isinstance(log_ratio, float) else jnp.exp(log_ratio)
 
 
-def _mean_loss(q: float, z: Array, rate: Array, nu: float | Array) -> Array:
+def _transmitted(q: float, z: Array | None, nu: float | Array) -> float | Array:
+    """Mean of u^q exp(-z u); z is 0 where there is none."""
+    ratio = _gamma_ratio(q, nu)
+    return ratio if z is None else ratio * jnp.exp(-(nu + 3 + q) * jnp.log1p(z))
+
+
+def _mean_loss(q: float, z: Array | None, rate: Array, nu: float | Array) -> Array:
     """Mean of u^q exp(-z u) (1 - exp(-rate u)), to full relative accuracy at small rates."""
-    power = nu + 3 + q
-    transmitted = _gamma_ratio(q, nu) * jnp.exp(-power * jnp.log1p(z))
-    return -transmitted * jnp.expm1(-power * jnp.log1p(rate / (1 + z)))
+    relative = rate if z is None else rate / (1 + z)
+    return -_transmitted(q, z, nu) * jnp.expm1(-(nu + 3 + q) * jnp.log1p(relative))
 
 
 def _mean_diffraction(
-    q: float, z: Array, scale: Array, refractive_index: complex, nu: float | Array
+    q: float, z: Array | None, scale: Array, of: Matter, nu: float | Array
 ) -> Array:
     """Mean of u^q exp(-z u) Re K(t), where t = w u is complex: w = 2 pi (k + i (n - 1)) scale."""
-    n, k = refractive_index.real, -refractive_index.imag
-    w = 2 * math.pi * math.hypot(k, n - 1) * scale
-    angle_w = math.atan2(n - 1, k)
-    real, imaginary = 1 + z + 2 * math.pi * k * scale, 2 * math.pi * (n - 1) * scale
+    w = 2 * math.pi * of.modulus * scale
+    real = (1 if z is None else 1 + z) + 2 * math.pi * of.absorption * scale
+    imaginary = 2 * math.pi * of.phase_lag * scale
     log_modulus = jnp.log(real**2 + imaginary**2) / 2
     angle = jnp.arctan2(imaginary, real)
 
@@ -143,11 +178,7 @@ def _mean_diffraction(
         """Real part of the mean of u^(q - order) exp(-(z + w) u) / w^order, times |w|^order."""
         power = nu + 3 + q - order
         decay = _gamma_ratio(q - order, nu) * jnp.exp(-power * log_modulus)
-        return decay * jnp.cos(power * angle + order * angle_w)
+        return decay * jnp.cos(power * angle + order * of.angle)
 
-    def direct(order: int) -> Array:
-        """Mean of u^(q - order) exp(-z u)."""
-        return _gamma_ratio(q - order, nu) * jnp.exp(-(nu + 3 + q - order) * jnp.log1p(z))
-
-    lagged = mean(2) - math.cos(2 * angle_w) * direct(2)
-    return direct(0) / 2 + mean(1) / w + lagged / w**2
+    lagged = mean(2) - of.cos_twice * _transmitted(q - 2, z, nu)
+    return _transmitted(q, z, nu) / 2 + mean(1) / w + lagged / w**2

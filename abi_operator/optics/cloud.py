@@ -3,24 +3,24 @@
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._numerics import fenced
 from ..atmosphere import Atmosphere
-from ..bands import Band
+from ..bands import AnyBand, OneOf, constants, first_missing, one_of
 from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
-from .anomalous_diffraction import mean_efficiencies
+from .anomalous_diffraction import Matter, matter, mean_efficiencies
 from .droplets import NU, effective_radius
 from .mie_aerosol import mie_optics
 from .mie_phase import MiePhase
 from .mie_table import DROPLETS
 from .phase import HenyeyGreenstein
+from .pointwise import pointwise
 from .water import REFRACTIVE_INDEX, droplet_asymmetry
 
 # Radius at which the formulas are evaluated, to no effect, where there is no cloud. [m]
 _IDLE_RADIUS = 1e-5
 
 
-def liquid_cloud(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
+def liquid_cloud(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     r"""Optical properties of liquid cloud, from mass and number of its droplets.
 
     .. math:: \tau = \frac{3\, m\, \bar Q_\mathrm{ext}}{4\, \rho_w\, r_\mathrm{eff}}
@@ -38,8 +38,8 @@ def liquid_cloud(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
     band
         Band for which the refractive index of water is tabulated.
     """
-    if band.name not in REFRACTIVE_INDEX:
-        raise ValueError(f"no water index for band {band.name!r}; have {list(REFRACTIVE_INDEX)}.")
+    if missing := first_missing(band.name, REFRACTIVE_INDEX):
+        raise ValueError(f"no water index for band {missing!r}; have {list(REFRACTIVE_INDEX)}.")
     radius = effective_radius(atmosphere.liquid)
     cloudy = radius > 0
     radius = jnp.where(cloudy, radius, radius.dtype.type(_IDLE_RADIUS))
@@ -50,18 +50,21 @@ def liquid_cloud(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
         q_abs = q_ext * droplets.coalbedo
         phase = MiePhase(radius_um, DROPLETS, band.name)
     else:
-        index = REFRACTIVE_INDEX[band.name]
-
-        # A kernel of its own: what mixes layers would evaluate it for each of its outputs.
-        @fenced
-        def mitchell(radius_um: Array) -> tuple[Array, Array, Array]:
-            efficiencies = mean_efficiencies(radius_um, band.wavelength_um, index, NU)
-            return *efficiencies, droplet_asymmetry(radius_um, band.name)
-
-        q_ext, q_abs, asymmetry = mitchell(radius_um)
+        water = constants(lambda x: matter(REFRACTIVE_INDEX[x]), band.name, radius.dtype)
+        name = one_of(band.name)
+        q_ext, q_abs, asymmetry = _mitchell(radius_um, band.wavelength_um, water, name)
         phase = HenyeyGreenstein(asymmetry)
     mass = jnp.where(cloudy, atmosphere.liquid.mass_path, 0)
     cross_section = 3 * mass / (4 * WATER_DENSITY * radius)
     extinction = cross_section * q_ext
     scatterer = Scatterer(extinction - cross_section * q_abs, phase)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
+
+
+@pointwise
+def _mitchell(
+    radius_um: Array, wavelength_um: float | Array, water: Matter, band: OneOf
+) -> tuple[Array, Array, Array]:
+    """Efficiencies for extinction and absorption, and asymmetry factor. [-]"""
+    efficiencies = mean_efficiencies(radius_um, wavelength_um, water, NU)
+    return *efficiencies, droplet_asymmetry(radius_um, band)

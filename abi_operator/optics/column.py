@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..atmosphere import Atmosphere
-from ..bands import Band
+from ..bands import AnyBand
 from ..optical_properties import OpticalProperties
 from .aerosol import aerosol
 from .cloud import liquid_cloud
@@ -13,7 +13,7 @@ from .rayleigh import rayleigh
 
 
 def column_optics(
-    atmosphere: Atmosphere, band: Band, gases: Sequence[str] = ALL_GASES
+    atmosphere: Atmosphere, band: AnyBand, gases: Sequence[str] = ALL_GASES
 ) -> OpticalProperties:
     """Optical properties of all that a column holds, in one band.
 

@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 
 from ..atmosphere import LiquidCloud
 from ..constants import WATER_DENSITY
+from .pointwise import choose, pointwise
 
 # Shape of the gamma distribution, nu. [-] (effective variance 0.1: Hansen 1971,
 # doi:10.1175/1520-0469(1971)028<1400:MSOPLI>2.0.CO;2)
@@ -38,14 +39,17 @@ def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
     liquid
         Mass and number of the droplets. [kg m-2], [m-2]
     """
-    mass, number = liquid.mass_path, liquid.number_path
+    return _radius(liquid.mass_path, liquid.number_path)
+
+
+@pointwise
+def _radius(mass: Float[Array, "*n"], number: Float[Array, "*n"]) -> Float[Array, "*n"]:
     cloudy = (mass > 0) & (number > 0)
     small = mass <= number * (_UNIT_MASS * SMALLEST_RADIUS**3)
     large = mass >= number * (_UNIT_MASS * LARGEST_RADIUS**3)
     usual = cloudy & ~small & ~large
     # Roots are divided, and not masses, as the derivative of a quotient squares its denominator.
-    radius = jnp.cbrt(jnp.where(usual, mass, 1)) / jnp.cbrt(jnp.where(usual, number, 1))
+    radius = jnp.cbrt(choose(usual, mass, 1.0)) / jnp.cbrt(choose(usual, number, 1.0))
     radius = radius * _UNIT_MASS ** (-1 / 3)
-    smallest, largest = (radius.dtype.type(limit) for limit in (SMALLEST_RADIUS, LARGEST_RADIUS))
-    radius = jnp.where(small, smallest, jnp.where(large, largest, radius))
-    return jnp.where(cloudy, radius, 0)
+    limited = choose(small, SMALLEST_RADIUS, choose(large, LARGEST_RADIUS, radius))
+    return choose(cloudy, limited, 0.0)

@@ -10,11 +10,11 @@ from jaxtyping import Array, Float
 
 from .._numerics import safe_divide
 from ..atmosphere import Atmosphere, Hydrometeor
-from ..bands import Band
+from ..bands import AnyBand, Band, OneOf, constants, first_missing, one_of
 from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
 from . import rain, water
-from .anomalous_diffraction import mean_efficiencies
+from .anomalous_diffraction import Matter, matter, mean_efficiencies
 from .cloud import liquid_cloud
 from .droplets import LARGEST_RADIUS, NU, SMALLEST_RADIUS, effective_radius
 from .gamma import Habit, equivalent_shape, mean_mass_of_path, photon_path, sphere_habit
@@ -25,8 +25,9 @@ from .ice import (
     ice_coalbedo,
     ice_mass_extinction,
 )
-from .ice_tables import CRYSTALS, FU_RANGE_UM, ICE_DENSITY, ICE_INDEX
+from .ice_tables import CRYSTALS, FU, FU_RANGE_UM, ICE_DENSITY, ICE_INDEX, Fu
 from .phase import HenyeyGreenstein
+from .pointwise import choose, pointwise
 
 HABITS: dict[str, Habit] = {
     "drops": sphere_habit(WATER_DENSITY, WATER_DENSITY),
@@ -110,7 +111,7 @@ CLASSES: dict[str, ClassOptics] = {
 def hydrometeor(
     atmosphere: Atmosphere,
     name: str,
-    band: Band,
+    band: AnyBand,
     classes: Mapping[str, ClassOptics] = CLASSES,
 ) -> OpticalProperties:
     r"""Optical properties of one class of hydrometeor, from mass and number of its particles.
@@ -141,30 +142,15 @@ def hydrometeor(
     if name not in atmosphere.hydrometeors:
         have = sorted(atmosphere.hydrometeors)
         raise ValueError(f"no hydrometeor {name!r}; the atmosphere has {have}.")
-    if band.name not in ICE_INDEX:
-        raise ValueError(f"no index of ice and water for {band.name!r}; have {list(ICE_INDEX)}.")
+    if missing := first_missing(band.name, ICE_INDEX):
+        raise ValueError(f"no index of ice and water for {missing!r}; have {list(ICE_INDEX)}.")
     optics, habit = _class_optics(name, classes)
     particles = atmosphere.hydrometeors[name]
     present, radius = _radius(particles, optics, habit)
     mass = jnp.where(present, particles.mass_path, 0)
-    if optics.efficiencies == "fu1996":
-        size_um = 1e6 * SIZE_PER_PATH * 4 / 3 * radius
-        extinction = mass * ice_mass_extinction(size_um, band.name)
-        scattering = extinction * (1 - ice_coalbedo(size_um, band.name))
-    else:
-        index = (water.REFRACTIVE_INDEX if _is_water(habit) else ICE_INDEX)[band.name]
-        q_ext, q_abs = mean_efficiencies(
-            1e6 * radius,
-            band.wavelength_um,
-            index,
-            equivalent_shape(habit, optics.nu),
-            internal_reflection=optics.internal_reflection,
-            tunnelling_factor=optics.tunnelling_factor,
-        )
-        area = mass / (habit.density * 4 / 3 * radius)
-        extinction = area * q_ext
-        scattering = extinction - area * q_abs
-    scatterer = Scatterer(scattering, HenyeyGreenstein(_asymmetry(radius, optics, band.name)))
+    cross_section, absorbed, asymmetry = _seen(radius, optics, habit, band)
+    extinction = mass * cross_section
+    scatterer = Scatterer(extinction - mass * absorbed, HenyeyGreenstein(asymmetry))
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 
@@ -260,32 +246,90 @@ def _is_water(habit: Habit) -> bool:
 def _radius(particles: Hydrometeor, optics: ClassOptics, habit: Habit) -> tuple[Array, Array]:
     """Whether there are particles, and their effective radius, bent at the limits. [m]"""
     mass, number = particles.mass_path, particles.number_path
+    limits = optics.smallest_radius, optics.largest_radius
+    return _present(mass, number), _bent_radius(mass, number, habit, optics.nu, limits)
+
+
+def _present(mass: Array, number: Array) -> Array:
     # Below it the reciprocal, which a derivative needs, is not finite.
     tiny = np.finfo(mass.dtype).tiny * 4
-    present = (mass > tiny) & (number > tiny)
-    log_mass = jnp.log(jnp.where(present, mass, 1)) - jnp.log(jnp.where(present, number, 1))
-    log_radius = photon_path(log_mass, habit, optics.nu) + math.log(3 / 4)
-    log_radius = jnp.where(present, log_radius, math.log(_IDLE_RADIUS))
-    small, large = math.log(optics.smallest_radius), math.log(optics.largest_radius)
+    return (mass > tiny) & (number > tiny)
+
+
+@pointwise
+def _bent_radius(
+    mass: Array, number: Array, habit: Habit, nu: float | Array, limits: tuple[float, float]
+) -> Array:
+    present = _present(mass, number)
+    log_mass = jnp.log(choose(present, mass, 1.0)) - jnp.log(choose(present, number, 1.0))
+    log_radius = photon_path(log_mass, habit, nu) + math.log(3 / 4)
+    log_radius = choose(present, log_radius, math.log(_IDLE_RADIUS))
+    small, large = (math.log(x) for x in limits)
     over, under = log_radius > large, log_radius < small
-    excess = jnp.where(over, log_radius - large, jnp.where(under, small - log_radius, 0))
+    excess = choose(over, log_radius - large, choose(under, small - log_radius, 0.0))
     bent = _BEND * -jnp.expm1(-excess / _BEND)
-    log_radius = jnp.where(over, large + bent, jnp.where(under, small - bent, log_radius))
-    return present, jnp.exp(log_radius)
+    log_radius = choose(over, large + bent, choose(under, small - bent, log_radius))
+    return jnp.exp(log_radius)
 
 
-def _asymmetry(radius: Array, optics: ClassOptics, band: str) -> Array:
-    """Asymmetry factor of particles of an effective radius. [m], [-]"""
-    given = optics.asymmetry
-    if isinstance(given, str):
-        if given == "droplets":
-            return water.droplet_asymmetry(1e6 * radius, band)
-        if given == "rain":
-            return rain.rain_asymmetry(1e6 * radius, band)
-        if given == "fu1996":
-            return ice_asymmetry(1e6 * SIZE_PER_PATH * 4 / 3 * radius, band)
-        given = ROUGHENED_ASYMMETRY
-    return jnp.broadcast_to(jnp.asarray(given, radius.dtype), radius.shape)
+def _seen(
+    radius: Array, optics: ClassOptics, habit: Habit, band: AnyBand
+) -> tuple[Array, Array, Array]:
+    """Extinction and absorption per mass, and asymmetry factor, by effective radius. [m2 kg-1]"""
+    dtype, given = radius.dtype, optics.asymmetry
+    index = water.REFRACTIVE_INDEX if _is_water(habit) else ICE_INDEX
+    extinction, absorption, asymmetry = _of_radius(
+        radius,
+        band.wavelength_um,
+        constants(lambda name: matter(index[name]), band.name, dtype),
+        constants(FU.__getitem__, band.name, dtype),
+        one_of(band.name),
+        optics._replace(
+            habit="",
+            nu=equivalent_shape(habit, optics.nu),
+            asymmetry=given if isinstance(given, str) else "",
+        ),
+        habit.density,
+    )
+    if not isinstance(given, str):
+        asymmetry = jnp.broadcast_to(jnp.asarray(given, dtype), radius.shape)
+    return extinction, absorption, asymmetry
+
+
+@pointwise
+def _of_radius(
+    radius: Array,
+    wavelength_um: float | Array,
+    substance: Matter,
+    fits: Fu,
+    band: OneOf,
+    optics: ClassOptics,
+    density: float,
+) -> tuple[Array, Array, Array]:
+    radius_um, size_um = 1e6 * radius, 1e6 * SIZE_PER_PATH * 4 / 3 * radius
+    if optics.efficiencies == "fu1996":
+        extinction = ice_mass_extinction(size_um, fits)
+        absorption = extinction * ice_coalbedo(size_um, fits)
+    else:
+        q_ext, q_abs = mean_efficiencies(
+            radius_um,
+            wavelength_um,
+            substance,
+            optics.nu,
+            internal_reflection=optics.internal_reflection,
+            tunnelling_factor=optics.tunnelling_factor,
+        )
+        area = 1 / (density * 4 / 3 * radius)
+        extinction, absorption = area * q_ext, area * q_abs
+    if optics.asymmetry == "droplets":
+        asymmetry = water.droplet_asymmetry(radius_um, band)
+    elif optics.asymmetry == "rain":
+        asymmetry = rain.rain_asymmetry(radius_um, band)
+    elif optics.asymmetry == "fu1996":
+        asymmetry = ice_asymmetry(size_um, fits)
+    else:
+        asymmetry = jnp.full_like(radius, ROUGHENED_ASYMMETRY)
+    return extinction, absorption, asymmetry
 
 
 def _fitted_radii(optics: ClassOptics) -> tuple[float, float]:

@@ -17,7 +17,8 @@ import math
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .ice_tables import FU, FU_RANGE_UM
+from .ice_tables import FU_RANGE_UM, Fu
+from .pointwise import choose
 
 # Asymmetry factor of severely roughened aggregates of columns, in the visible. [-]
 ROUGHENED_ASYMMETRY = 0.75
@@ -41,35 +42,35 @@ def fitted_size(size_um: Float[Array, "*n"]) -> Float[Array, "*n"]:
     lower, upper = FU_RANGE_UM[0] + _BEND_UM, FU_RANGE_UM[1] - _BEND_UM
     small, large = size_um < lower, size_um > upper
     # Each exponential sees only the sizes that it is for.
-    below = jnp.exp((jnp.where(small, size_um, lower) - lower) / _BEND_UM)
-    above = jnp.exp((upper - jnp.where(large, size_um, upper)) / _BEND_UM)
-    ends = jnp.where(small, lower - _BEND_UM * (1 - below), upper + _BEND_UM * (1 - above))
-    return jnp.where(small | large, ends, size_um)
+    below = jnp.exp((choose(small, size_um, lower) - lower) / _BEND_UM)
+    above = jnp.exp((upper - choose(large, size_um, upper)) / _BEND_UM)
+    ends = choose(small, lower - _BEND_UM * (1 - below), upper + _BEND_UM * (1 - above))
+    return choose(small | large, ends, size_um)
 
 
-def ice_asymmetry(size_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+def ice_asymmetry(size_um: Float[Array, "*n"], fits: Fu) -> Float[Array, "*n"]:
     """Asymmetry factor of smooth hexagonal columns. [-]
 
     Parameters
     ----------
     size_um
         Generalized effective size, above 0. [um]
-    band
-        Name of the band.
+    fits
+        Those of the band, of `ice_tables.FU`.
     """
-    return _cubic(FU[band].asymmetry, fitted_size(size_um))
+    return _cubic(fits.asymmetry, fitted_size(size_um))
 
 
-def ice_coalbedo(size_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+def ice_coalbedo(size_um: Float[Array, "*n"], fits: Fu) -> Float[Array, "*n"]:
     """1 - ssa of smooth hexagonal columns; parameters as in `ice_asymmetry`. [-]"""
-    return _cubic(FU[band].coalbedo, fitted_size(size_um))
+    return _cubic(fits.coalbedo, fitted_size(size_um))
 
 
-def ice_mass_extinction(size_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+def ice_mass_extinction(size_um: Float[Array, "*n"], fits: Fu) -> Float[Array, "*n"]:
     """Extinction cross-section per mass of ice; parameters as in `ice_asymmetry`. [m2 kg-1]"""
-    a0, a1 = FU[band].extinction
+    a0, a1 = fits.extinction
     return 1e3 * (a0 + a1 / fitted_size(size_um))
 
 
-def _cubic(c: tuple[float, float, float, float], x: Array) -> Array:
+def _cubic(c: tuple[float | Array, ...], x: Array) -> Array:
     return c[0] + x * (c[1] + x * (c[2] + x * c[3]))

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from jaxtyping import Array
+
 from .gamma import Habit, mitchell
 
 # Density of ice. [kg m-3]
@@ -47,9 +49,9 @@ class Fu(NamedTuple):
         Coefficients of 1, D, D^2, D^3. [-], [um-1], ...
     """
 
-    extinction: tuple[float, float]
-    coalbedo: tuple[float, float, float, float]
-    asymmetry: tuple[float, float, float, float]
+    extinction: tuple[float | Array, ...]
+    coalbedo: tuple[float | Array, ...]
+    asymmetry: tuple[float | Array, ...]
 
 
 # Generalized effective sizes for which the fits hold. [um]

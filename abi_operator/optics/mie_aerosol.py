@@ -5,8 +5,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import fenced
-from .mie_table import band_table, mie_table
+from ..bands import AnyName, OneOf, one_of
+from .mie_table import mie_table, stacked
+from .pointwise import pointwise
 from .radius_cubics import locate, read
 
 
@@ -28,7 +29,7 @@ class MieOptics(NamedTuple):
     asymmetry: Float[Array, "*n"]
 
 
-def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: str) -> MieOptics:
+def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: AnyName) -> MieOptics:
     r"""Optics of lognormal distributions of spheres, from the table of their species.
 
     Extinction is per volume of particles, :math:`\int Q\, \pi r^2\, n(r)\, dr / \int r^3\, n\, dr`,
@@ -55,13 +56,12 @@ def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: str)
     .. [1] G. Mie, "Beitraege zur Optik trueber Medien, speziell kolloidaler Metalloesungen", Ann.
        Phys., 330, 377-445, 1908, doi:10.1002/andp.19083300302
     """
-    optics = band_table(species, band).efficiencies
-    nodes = mie_table(species).effective_radius_um
+    return MieOptics(*_interpolated(effective_radius_um, species, one_of(band)))
 
-    @fenced
-    def interpolate(radius_um: Array) -> tuple[Array, Array, Array]:
-        row, weights = locate(radius_um, nodes)
-        values = read(jnp.asarray(optics, weights.dtype), row, weights)
-        return jnp.exp(values[..., 0]), jnp.exp(values[..., 1]), values[..., 2]
 
-    return MieOptics(*interpolate(effective_radius_um))
+@pointwise
+def _interpolated(radius_um: Array, species: str, band: OneOf) -> tuple[Array, Array, Array]:
+    row, weights = locate(radius_um, mie_table(species).effective_radius_um)
+    table, first = stacked(species, band, lambda x: x.efficiencies)
+    values = read(jnp.asarray(table, weights.dtype), row + first, weights)
+    return jnp.exp(values[..., 0]), jnp.exp(values[..., 1]), values[..., 2]

@@ -17,7 +17,6 @@ the table smooths them. Averaged over the sphere P is 1, and its mean cosine is 
 2e-4, in the first and the last interval of radius to 1e-3 (tests/abi_operator/optics).
 """
 
-from functools import partial
 from typing import final
 
 import equinox as eqx
@@ -25,9 +24,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import fenced
+from ..bands import OneOf, constants, one_of
 from ..optical_properties import PhaseFunction
-from .mie_table import band_table, mie_table
+from .mie_table import band_table, mie_table, stacked
+from .pointwise import pointwise
 from .radius_cubics import locate, read
 
 
@@ -47,7 +47,7 @@ class MiePhase(PhaseFunction):
 
     effective_radius_um: Float[Array, ""] | Float[Array, " layer"]
     material: str = eqx.field(static=True)
-    band: str = eqx.field(static=True)
+    band: OneOf = eqx.field(converter=one_of)
 
     def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
         """Legendre moments.
@@ -57,39 +57,50 @@ class MiePhase(PhaseFunction):
         ValueError
             Where more are asked for than the table holds.
         """
-        held = band_table(self.material, self.band).moments.shape[1]
+        held = band_table(self.material, self.band.names[0]).moments.shape[1]
         if num_moments > held:
             raise ValueError(
                 f"the Mie table of {self.material!r} holds {held} moments, enough for {held - 1} "
                 f"streams; got {num_moments=}."
             )
         radius_um = jnp.atleast_1d(self.effective_radius_um)
-        return fenced(partial(_moments, self.material, self.band, num_moments))(radius_um)
+        return _moments(radius_um[:, None], self.material, self.band, num_moments)
 
     def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
         """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
         radius_um = jnp.atleast_1d(self.effective_radius_um)
-        return fenced(partial(_phase_function, self.material, self.band))(radius_um, cos_scattering)
+        nodes = constants(
+            lambda name: band_table(self.material, name).coordinate, self.band, radius_um.dtype
+        )
+        nodes = jnp.asarray(nodes, radius_um.dtype)
+        return _phase_function(radius_um, cos_scattering, nodes, self.material, self.band)
 
 
-# Both as kernels of their own: what mixes layers would look the table up for each of its outputs.
-def _moments(material: str, band: str, num_moments: int, radius_um: Array) -> Array:
-    table = band_table(material, band).moments[:, :num_moments]
+@pointwise
+def _moments(
+    radius_um: Float[Array, "layer 1"], material: str, band: OneOf, num_moments: int
+) -> Float[Array, "layer moment"]:
+    row, weights = locate(radius_um[:, 0], mie_table(material).effective_radius_um)
+    table, first = stacked(material, band, lambda x: x.moments[:, :num_moments])
+    return read(jnp.asarray(table, weights.dtype), row + first, weights)
+
+
+@pointwise
+def _phase_function(
+    radius_um: Float[Array, " layer"],
+    cosine: Float[Array, ""],
+    nodes: Float[Array, " angle"],
+    material: str,
+    band: OneOf,
+) -> Float[Array, " layer"]:
     row, weights = locate(radius_um, mie_table(material).effective_radius_um)
-    return read(jnp.asarray(table, weights.dtype), row, weights)
-
-
-def _phase_function(material: str, band: str, radius_um: Array, cos_scattering: Array) -> Array:
-    table = band_table(material, band)
-    row, weights = locate(radius_um, mie_table(material).effective_radius_um)
-    dtype = weights.dtype
-    backward, forward = (dtype.type(x) for x in table.offsets)
-    u = jnp.log((1 + cos_scattering + backward) / (1 - cos_scattering + forward))
-    nodes = jnp.asarray(table.coordinate, dtype)
+    backward, forward = band_table(material, band.names[0]).offsets
+    u = jnp.log((1 + cosine + backward) / (1 - cosine + forward))
     k = jnp.sum(u >= nodes[1:-1], dtype=jnp.int32)
     width = nodes[k + 1] - nodes[k]
     x = (u - nodes[k]) / width
-    pair = jax.lax.dynamic_slice_in_dim(jnp.asarray(table.log_phase, dtype), k, 2)
+    table, first = stacked(material, band, lambda x: x.log_phase)
+    pair = jax.lax.dynamic_slice_in_dim(jnp.asarray(table, weights.dtype), first + k, 2)
     (low, low_slope), (high, high_slope) = pair
     bend = (1 - x) * low_slope - x * high_slope
     by_radius = low + (high - low) * (x * x * (3 - 2 * x)) + width * x * (1 - x) * bend

@@ -5,14 +5,16 @@ were computed, and from which sizes and refractive indices, is written in its at
 variables; the schema is in ``benchmarks/mie_ensembles.py``, with which they were written.
 """
 
+from collections.abc import Callable
 from functools import cache
 from importlib.resources import as_file, files
 from typing import NamedTuple
 
 import numpy as np
 import scipy  # its submodules load when they are first used
-from jaxtyping import Float
+from jaxtyping import Array, Float, Int
 
+from ..bands import OneOf
 from .radius_cubics import padded
 
 FILES = ("aerosol_mie.nc", "droplet_mie.nc")
@@ -99,6 +101,29 @@ def band_table(material: str, band: str) -> BandTable:
         (backward, forward),
         np.stack([by_angle, slopes], axis=1),
     )
+
+
+def stacked(
+    material: str, band: OneOf, part: Callable[[BandTable], np.ndarray]
+) -> tuple[np.ndarray, int | Int[Array, ""]]:
+    """Tables of all bands of which the band may be one, row after row, and its own first row.
+
+    Parameters
+    ----------
+    material
+        Name of the table.
+    band
+        Name of the band.
+    part
+        What of a band's table is wanted.
+
+    Raises
+    ------
+    ValueError
+        Where there is none.
+    """
+    tables = [part(band_table(material, name)) for name in band.names]
+    return np.concatenate(tables), 0 if band.place is None else band.place * len(tables[0])
 
 
 def _find(material: str) -> tuple[str, int]:

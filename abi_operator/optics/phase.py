@@ -11,16 +11,20 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..optical_properties import PhaseFunction
+from .pointwise import choose, pointwise
 
-_BLOCK = 20  # moments written out at a time
+_BLOCK = 16  # powers that are products of x^1, x^2, x^4 and x^8
 
 
-def _powers(x: Float[Array, " layer"], num: int) -> list[Float[Array, " layer"]]:
-    """x^0 to x^(num - 1)."""
-    powers = [jnp.ones_like(x)]
-    for _ in range(num - 1):
-        powers.append(powers[-1] * x)
-    return powers
+@pointwise
+def _powers(x: Float[Array, "layer 1"], start: int, stop: int, step: int) -> Array:
+    """Powers of numbers, products of x^1, x^2, x^4 ...: few operations to compile, and no loop."""
+    left, square = np.arange(start, stop, step), x
+    product = jnp.ones((x.shape[0], left.size), x.dtype)
+    while np.any(left):
+        product = product * choose(jnp.asarray(left % 2 == 1), square, 1.0)
+        left, square = left // 2, square * square
+    return product
 
 
 @final
@@ -45,20 +49,24 @@ class HenyeyGreenstein(PhaseFunction):
     def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
         r"""Legendre moments g\ :sup:`l`, as products: the derivative at g = 0 is exact."""
         g = jnp.atleast_1d(self.asymmetry)
-        # Written out, as products of short series and powers: several times faster than
-        # `jnp.cumprod`, backwards above all, with few operations to compile.
-        block = min(_BLOCK, num_moments)
-        low = _powers(g, block)
-        high = _powers(low[-1] * g, -(-num_moments // block))
-        moments = jnp.stack(high, axis=1)[:, :, None] * jnp.stack(low, axis=1)[:, None, :]
+        if num_moments <= _BLOCK:
+            return _powers(g[:, None], 0, num_moments, 1)
+        # Long series are short ones times powers: one product a moment.
+        low, blocks = _powers(g[:, None], 0, _BLOCK, 1), -(-num_moments // _BLOCK)
+        high = _powers(g[:, None], 0, blocks * _BLOCK, _BLOCK)
+        moments = high[:, :, None] * low[:, None, :]
         return moments.reshape(g.shape[0], -1)[:, :num_moments]
 
     def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
         """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
-        g = jnp.atleast_1d(self.asymmetry)
-        # 1 + g^2 - 2 g cos, written so that float32 keeps its digits in a strong forward peak.
-        distance = (1 - g) ** 2 + 2 * g * (1 - cos_scattering)
-        return (1 - g) * (1 + g) / (distance * jnp.sqrt(distance))
+        return _henyey_greenstein(jnp.atleast_1d(self.asymmetry), cos_scattering)
+
+
+@pointwise
+def _henyey_greenstein(g: Array, cos_scattering: Array) -> Array:
+    # 1 + g^2 - 2 g cos, written so that float32 keeps its digits in a strong forward peak.
+    distance = (1 - g) ** 2 + 2 * g * (1 - cos_scattering)
+    return (1 - g) * (1 + g) / (distance * jnp.sqrt(distance))
 
 
 @final

@@ -62,10 +62,12 @@ def locate(
     last = len(nodes_um) - 1
     step = float(np.log(nodes_um[-1] / nodes_um[0])) / last
     # Held before its logarithm is taken: weights and derivatives are finite even at a radius of 0.
-    held = jnp.clip(radius_um, dtype.type(nodes_um[0]), dtype.type(nodes_um[-1]))
+    # (Not by `jnp.clip`, which would be a kernel of its own within a fence.)
+    held = jax.lax.clamp(dtype.type(nodes_um[0]), radius_um, dtype.type(nodes_um[-1]))
     x = jnp.log(held / dtype.type(nodes_um[0])) / dtype.type(step)
-    row = jnp.clip(jax.lax.stop_gradient(x).astype(jnp.int32), 0, last - 1)
-    t = jnp.clip(x - row.astype(dtype), 0, 1)
+    whole = jax.lax.stop_gradient(x).astype(jnp.int32)
+    row = jax.lax.clamp(np.int32(0), whole, np.int32(last - 1))
+    t = x - row.astype(dtype)
     c0, c1, c2, c3 = jnp.asarray(_POWERS, dtype)
     t = t[..., None]
     return row, c0 + t * (c1 + t * (c2 + t * c3))
@@ -78,6 +80,6 @@ def read(
     weights = weights.reshape(*weights.shape, *(1,) * (table.ndim - 1))
     total = jnp.zeros((), table.dtype)
     for k in range(_NODES):
-        weight = jnp.take(weights, k, axis=row.ndim)
+        weight = jax.lax.index_in_dim(weights, k, row.ndim, keepdims=False)
         total = total + weight * table.at[row + k].get(mode="promise_in_bounds")
     return total

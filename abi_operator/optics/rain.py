@@ -2,6 +2,7 @@
 
 from jaxtyping import Array, Float
 
+from ..bands import AnyName
 from .water import interpolate
 
 # Asymmetry factor of exponential distributions (nu = 0) of spheres of water, against effective
@@ -47,7 +48,7 @@ ASYMMETRY: dict[str, tuple[float, ...]] = {
 # fmt: on
 
 
-def rain_asymmetry(effective_radius_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+def rain_asymmetry(effective_radius_um: Float[Array, "*n"], band: AnyName) -> Float[Array, "*n"]:
     """Asymmetry factor of raindrops, constant below 10 um and above 2 mm. [-]
 
     Large drops absorb what they refract in the near infrared, and what is left is diffracted or
@@ -60,4 +61,4 @@ def rain_asymmetry(effective_radius_um: Float[Array, "*n"], band: str) -> Float[
     band
         Name of the band.
     """
-    return interpolate(effective_radius_um, EFFECTIVE_RADIUS_UM, ASYMMETRY[band])
+    return interpolate(effective_radius_um, EFFECTIVE_RADIUS_UM, ASYMMETRY, band)

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..atmosphere import Atmosphere
-from ..bands import Band
+from ..bands import AnyBand, constants, first_missing
 from ..constants import STANDARD_PRESSURE
 from ..optical_properties import OpticalProperties, Scatterer
 from .phase import RayleighPhase
@@ -103,7 +103,7 @@ def king_factor(
     return (_NITROGEN * nitrogen + _OXYGEN * oxygen + _ARGON + 1.15 * dioxide) / total
 
 
-def rayleigh(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
+def rayleigh(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     r"""Rayleigh scattering by the air of each layer, in proportion to its mass.
 
     .. math:: \tau_k = \tau_0\, (p_{k+1} - p_k) / p_0, \qquad p_0 = 1013.25\ \mathrm{hPa}
@@ -116,11 +116,17 @@ def rayleigh(atmosphere: Atmosphere, band: Band) -> OpticalProperties:
         Band for which the depth :math:`\tau_0` at standard pressure is tabulated, by the full form
         of Bodhaine et al. (`bodhaine1999`).
     """
-    if band.name not in STANDARD_DEPTH:
-        raise ValueError(f"no Rayleigh depth for band {band.name!r}; have {list(STANDARD_DEPTH)}.")
-    scattering = jnp.diff(atmosphere.pressure) * (STANDARD_DEPTH[band.name] / STANDARD_PRESSURE)
-    dtype = scattering.dtype
-    phase = RayleighPhase(jnp.asarray(BETA2[band.name], dtype))
+    if missing := first_missing(band.name, STANDARD_DEPTH):
+        raise ValueError(f"no Rayleigh depth for band {missing!r}; have {list(STANDARD_DEPTH)}.")
+    dtype = atmosphere.pressure.dtype
+    per_pascal, beta2 = constants(_constants, band.name, dtype)
+    scattering = jnp.diff(atmosphere.pressure) * per_pascal
+    phase = RayleighPhase(jnp.asarray(beta2, dtype))
     return OpticalProperties(
         scattering[None, :], jnp.ones(1, dtype), (Scatterer(scattering, phase),)
     )
+
+
+def _constants(name: str) -> tuple[float, float]:
+    """Optical depth per pressure [Pa-1] and coefficient of P_2 [-] of a band."""
+    return STANDARD_DEPTH[name] / STANDARD_PRESSURE, BETA2[name]

@@ -1,8 +1,13 @@
 r"""Liquid water in the ABI bands: refractive index, and asymmetry factor of its droplets."""
 
+from collections.abc import Mapping
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+from ..bands import AnyName, names_of, one_of
 
 # n - ik of liquid water at the centroids of GOES-16. [-] (D. J. Segelstein, "The complex refractive
 # index of water", M.S. thesis, University of Missouri-Kansas City, 1981; n interpolated linearly, k
@@ -61,7 +66,7 @@ ASYMMETRY: dict[str, tuple[float, ...]] = {
 # fmt: on
 
 
-def droplet_asymmetry(effective_radius_um: Float[Array, "*n"], band: str) -> Float[Array, "*n"]:
+def droplet_asymmetry(effective_radius_um: Float[Array, "*n"], band: AnyName) -> Float[Array, "*n"]:
     """Asymmetry factor of cloud droplets, constant below 2 and above 50 um. [-]
 
     Between the radii of the table it is a cubic in the logarithm of radius, with a slope that is
@@ -74,11 +79,14 @@ def droplet_asymmetry(effective_radius_um: Float[Array, "*n"], band: str) -> Flo
     band
         Name of the band.
     """
-    return interpolate(effective_radius_um, EFFECTIVE_RADIUS_UM, ASYMMETRY[band])
+    return interpolate(effective_radius_um, EFFECTIVE_RADIUS_UM, ASYMMETRY, band)
 
 
 def interpolate(
-    x: Float[Array, "*n"], nodes: tuple[float | int, ...], values: tuple[float, ...]
+    x: Float[Array, "*n"],
+    nodes: tuple[float | int, ...],
+    values: Mapping[str, tuple[float, ...]],
+    band: AnyName,
 ) -> Float[Array, "*n"]:
     """Value of a table in the logarithm of `x`: cubics, constant beyond both ends.
 
@@ -89,16 +97,22 @@ def interpolate(
     x
         Where the table is read, above 0.
     nodes, values
-        The table; nodes rise.
+        The table of each band; nodes rise.
+    band
+        Name of the band.
     """
     dtype = x.dtype
     log_nodes = np.log(nodes)
-    cubics = jnp.asarray(_hermite_cubics(log_nodes, np.asarray(values)), dtype)
+    tables = [_hermite_cubics(log_nodes, np.asarray(values[name])) for name in names_of(band)]
+    cubics = jnp.asarray(np.concatenate(tables), dtype)
     knots = jnp.asarray(log_nodes, dtype)
-    log_x = jnp.clip(jnp.log(x), knots[0], knots[-1])
-    interval = jnp.sum(log_x[..., None] >= knots[1:-1], axis=-1)
+    # Not `jnp.clip`, which would be a kernel of its own within a fence.
+    log_x = jax.lax.clamp(knots[0], jnp.log(x), knots[-1])
+    interval = jnp.sum(log_x[..., None] >= knots[1:-1], axis=-1, dtype=jnp.int32)
     t = log_x - knots[interval]
-    c0, c1, c2, c3 = jnp.moveaxis(cubics[interval], -1, 0)
+    place = one_of(band).place
+    row = interval if place is None else interval + place * len(tables[0])
+    c0, c1, c2, c3 = jnp.moveaxis(cubics[row], -1, 0)
     return c0 + t * (c1 + t * (c2 + t * c3))
 
 

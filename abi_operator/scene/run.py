@@ -34,7 +34,6 @@ def run(
     write_block: WriteBlock,
     *,
     num_streams: int = 8,
-    chunk_columns: int = 1024,
     block_columns: int = 16384,
     progress: bool = True,
 ) -> dict[str, Attribute]:
@@ -50,7 +49,7 @@ def run(
         Numbers of rows and columns of the scene. [-]
     write_block
         Takes the index of the time, the rows and the block's result.
-    num_streams, chunk_columns
+    num_streams
         As in `simulate`.
     block_columns
         Atmospheric columns in memory at a time. [-]
@@ -66,11 +65,7 @@ def run(
     with tqdm(total=total, unit="columns", disable=None if progress else True) as bar:
         for time_index in range(len(times)):
             for rows in row_blocks(shape, block_columns):
-                result = simulate(
-                    read_block(time_index, rows),
-                    num_streams=num_streams,
-                    chunk_columns=chunk_columns,
-                )
+                result = simulate(read_block(time_index, rows), num_streams=num_streams)
                 write_block(time_index, rows, result)
                 account = add_accounts([account, result.attrs])
                 bar.update(result.sizes["y"] * result.sizes["x"])

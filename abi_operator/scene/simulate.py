@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
+from .._chunks import map_chunks
 from ..atmosphere import Atmosphere, State
 from ..bands import BANDS, check_bands
 from ..files import InputError
@@ -20,13 +21,14 @@ from ..radiance import THERMAL, radiance
 from ..reflectance import brf
 from ..satellites import solar_irradiance
 from .angles import sun_distance
-from .chunks import map_chunks
 from .columns import column_states, horizontal
 from .gases import check_gases, gases_attribute, gases_of
 
 # Pixels with one of these flags are not solved; those of a night shine in C07.
 _UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 _UNSOLVED = _UNSEEN | QUALITY_FLAGS["night"]
+# Columns whose optical depths are taken together, in chunks of one of these.
+_WIDTHS = 64, 1024
 
 
 def simulate(
@@ -35,7 +37,6 @@ def simulate(
     bands: Sequence[str] | None = None,
     gases: Sequence[str] | None = None,
     num_streams: int = 8,
-    chunk_columns: int = 1024,
 ) -> xr.Dataset:
     r"""Simulate the radiances and reflectances of a scenario.
 
@@ -53,8 +54,6 @@ def simulate(
         Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams
         Streams of the solver; see `solver.toa_brf`.
-    chunk_columns
-        Columns that are solved together. [-]
 
     Returns
     -------
@@ -77,19 +76,16 @@ def simulate(
     if gases and "vapour" not in scenario:
         raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
     states = column_states(scenario, bands)
-    num_columns = len(states.geometry.solar_zenith)
-    fields = map_chunks(
-        partial(_optical_depths, bands=bands), states.atmosphere, num_columns, chunk_columns
-    )
+    fields = _optical_depths(states.atmosphere, bands)
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
     options = {"gases": gases, "num_streams": num_streams}
-    fields |= _reflectances(states, flags, bands, options, chunk_columns)
+    fields |= _reflectances(states, flags, bands, options)
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
     distance = sun_distance(scenario["time"].values) if "time" in scenario.variables else 1.0
     light = [solar_irradiance(band, satellite) / (np.pi * distance**2) for band in bands]
     fields["radiance"] = fields["reflectance_factor"] * np.array(light)
     for band in set(bands) & set(THERMAL):
-        seen = _radiance(states, flags, band, satellite, distance, options, chunk_columns)
+        seen = _radiance(states, flags, band, satellite, distance, options)
         fields["radiance"][:, bands.index(band)] = seen
         fields["brightness_temperature"] = np.asarray(
             brightness_temperature(jnp.asarray(seen), band, satellite)
@@ -106,7 +102,7 @@ def simulate(
 
 
 def _reflectances(
-    states: State, flags: np.ndarray, bands: tuple[str, ...], options: dict, chunk_columns: int
+    states: State, flags: np.ndarray, bands: tuple[str, ...], options: dict
 ) -> dict[str, np.ndarray]:
     """Reflectance factor and brf (column, band) of the columns that can be solved."""
     solar = tuple(band for band in bands if band not in THERMAL)
@@ -114,12 +110,7 @@ def _reflectances(
     values = np.full((len(flags), len(bands)), np.nan)
     if solved.size and solar:
         index = np.array([bands.index(band) for band in solar])
-        values[np.ix_(solved, index)] = map_chunks(
-            partial(brf, bands=solar, **options),
-            jax.tree.map(lambda x: x[solved], states),
-            solved.size,
-            chunk_columns,
-        )
+        values[np.ix_(solved, index)] = brf(_some(states, solved), solar, **options)
     factor = np.cos(states.geometry.solar_zenith)[:, None] * values
     in_sight = (flags & QUALITY_FLAGS["out_of_sight"]) == 0
     night = ((flags & QUALITY_FLAGS["night"]) > 0) & in_sight
@@ -134,25 +125,33 @@ def _radiance(
     satellite: str,
     distance: float,
     options: dict,
-    chunk_columns: int,
 ) -> Any:
     """Radiance in one band that emits (column), NaN where nothing can be seen."""
     solved = np.flatnonzero((flags & _UNSEEN) == 0)
     values = np.full(len(flags), np.nan)
     if solved.size:
-        values[solved] = map_chunks(
-            partial(radiance, bands=(band,), satellite=satellite, sun_distance=distance, **options),
-            jax.tree.map(lambda x: x[solved], states),
-            solved.size,
-            chunk_columns,
-        )[:, 0]
+        seen = radiance(
+            _some(states, solved), (band,), satellite=satellite, sun_distance=distance, **options
+        )
+        values[solved] = np.asarray(seen)[:, 0]
     return values
 
 
-@partial(jax.jit, static_argnames="bands")
-def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str, jax.Array]:
-    """Optical depths of all that scatters (column, band), and of plumes at 550 nm (column)."""
+def _some(states: State, index: np.ndarray) -> State:
+    return jax.tree.map(lambda x: x[index], states)
 
+
+def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Optical depths of all that scatters (column, band), and of plumes at 550 nm (column)."""
+    leaves, structure = jax.tree.flatten(atmosphere)
+    function = partial(_depths_of_chunk, structure=structure, bands=bands)
+    own, batch = [True] * len(leaves), (len(atmosphere.pressure),)
+    found = map_chunks(function, (structure, bands), leaves, own, batch, _WIDTHS)
+    return jax.tree.map(np.asarray, found)
+
+
+@partial(jax.jit, static_argnames=("structure", "bands"))
+def _depths_of_chunk(leaves: list[jax.Array], structure: Any, bands: tuple[str, ...]) -> Any:
     def depths(column: Atmosphere) -> dict[str, jax.Array]:
         producers = {"rayleigh": rayleigh, "liquid": liquid_cloud}
         producers |= {name: partial(_aerosol, species=name) for name in column.plumes}
@@ -168,7 +167,7 @@ def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str,
             by_band["outside_fitted_range"] = jnp.stack(outside)
         return by_band | {f"{name}_aod_550": p.aod_550 for name, p in column.plumes.items()}
 
-    return jax.vmap(depths)(atmosphere)
+    return jax.vmap(depths)(jax.tree.unflatten(structure, leaves))
 
 
 def _aerosol(column, band, *, species: str):

@@ -18,9 +18,10 @@ from .azimuth import mode_kernels
 from .bordered import Bordered
 from .ground import black
 from .layer import half_layer, node_functions
-from .layer_adjoint import Layers
-from .mode_slopes import Kernels, Shared, mode_slopes
+from .layer_adjoint import Layers, Order
+from .mode_slopes import Kernels, Shared, mode_slopes, room
 
+_LATER = slice(1, None)  # modes but the mean
 _WHOLE = 2  # nodes up to which all layers of all modes are one kernel
 
 
@@ -75,30 +76,33 @@ def _reflectance(
 ) -> Float[Array, "*batch"]:
     modes = _Modes(inputs)
 
-    def put_on(stack, layers, odd, kernels, view_secant, *number):
-        # Of a layer that is the only one XLA would find no use for the number (see `one_kernel`).
-        layer = layers.layer(number[0] if number else jnp.zeros_like(odd), odd)
-        a, p = layer.matrices(kernels, view_secant, single_scattering)
-        return add_layer(stack, *half_layer(a, p, layer.tau, num_doublings), layer.tau)
+    def reflection(mean: bool, mode: _Mode) -> Array:
+        def put_on(stack, layers, odd, kernels, view_secant, *number):
+            # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
+            layer = layers.layer(number[0] if number else jnp.zeros_like(odd), odd)
+            a, p = layer.matrices(mean, kernels, view_secant, single_scattering)
+            return add_layer(stack, *half_layer(a, p, layer.tau, num_doublings), layer.tau)
 
-    put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
+        put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
+        kernels, view_secant = _kernels(mode.nodes, mode.beams), inputs.view_secant
 
-    def reflection(layers, odd, kernels, ground):
         def add(stack, *number):
-            return put_on(stack, layers, odd, kernels, inputs.view_secant, *number), None
+            return put_on(stack, modes.layers, mode.order.odd, kernels, view_secant, *number), None
 
-        numbers = jnp.arange(layers.tau.shape[0], dtype=layers.tau.dtype)
+        ground = modes.ground(mode, mean)
+        numbers = jnp.arange(inputs.tau.shape[0], dtype=inputs.tau.dtype)
         if numbers.size == 1:
             stack, _ = add(ground)
         else:
             stack, _ = jax.lax.scan(add, ground, numbers, reverse=True)
-        return top(stack).reflection()[0]
+        return mode.weight * top(stack).reflection()[0]
 
-    def step(total, mode):
-        return total + mode.weight * reflection(modes.layers, *modes.seen_by(mode)), None
-
-    value = inputs.weights[0] * reflection(modes.layers_of_the_mean, *modes.first())
-    return jax.lax.scan(step, value, modes.others())[0]
+    # Without slopes a kernel for the mean alone is soon compiled, and a tenth faster than to ask in
+    # each layer which mode it is.
+    first, others = (jax.tree.map(lambda x, i=i: x[i], modes.all()) for i in (0, _LATER))
+    return jax.lax.scan(
+        lambda total, mode: (total + reflection(False, mode), None), reflection(True, first), others
+    )[0]
 
 
 @partial(mode_sum.defjvp, symbolic_zeros=True)
@@ -119,56 +123,49 @@ def reflectance_and_gradient(
     Each column's slope is that of its own value. Slopes in the ground's cores are symmetric.
     """
     modes = _Modes(inputs)
-
-    def solve(layers, odd, kernels, ground, weight, slopes, kept):
-        shared, how = Shared(layers, inputs.view_secant), (num_doublings, single_scattering)
-        return mode_slopes(shared, *how, odd, kernels, ground, weight, slopes, kept)
-
-    layers = modes.layers_of_the_mean
-    nothing = jax.tree.map(jnp.zeros_like, Shared(layers, inputs.view_secant))
-    first, kept, mean = solve(layers, *modes.first(), inputs.weights[0], nothing, None)
-    coalbedo = mean.shared.layers.coalbedo
-    assert coalbedo is not None  # mode 0 depends on it
+    how = num_doublings, single_scattering
+    shared = Shared(modes.layers, inputs.view_secant)
 
     def step(carry, mode):
-        value, shared, kept = carry
-        reflection, kept, slopes = solve(
-            modes.layers, *modes.seen_by(mode), mode.weight, shared, kept
+        value, slopes, of_mean, kept = carry
+        kernels, ground = _kernels(mode.nodes, mode.beams), modes.ground(mode)
+        reflection, kept, found = mode_slopes(
+            shared, *how, mode.order, kernels, ground, mode.weight, slopes, kept
         )
-        ground = None if mode.ground is None else slopes.ground
-        return (
-            (value + mode.weight * reflection, slopes.shared, kept),
-            (reflection, (slopes.even_beams, slopes.odd_beams), ground),
-        )
+        if inputs.grounds is None:
+            mean = mode.order.mean
+            of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, found.ground)
+        own = None if inputs.grounds is None else found.ground
+        value = value + mode.weight * reflection
+        beams = found.even_beams, found.odd_beams
+        return (value, found.shared, of_mean, kept), (reflection, beams, own)
 
-    shared = mean.shared._replace(layers=mean.shared.layers._replace(coalbedo=None))
-    carry = inputs.weights[0] * first, shared, kept
-    (value, shared, _), (reflections, beams, grounds) = jax.lax.scan(step, carry, modes.others())
-    summed = shared.layers
+    nothing = jax.tree.map(jnp.zeros_like, (inputs.view_secant, shared, inputs.ground))
+    space = room(inputs.tau, modes.num_nodes, num_doublings)
+    carry, rows = jax.lax.scan(step, (*nothing, space), modes.all())
+    (value, slopes, of_mean, _), (reflections, beams, of_grounds) = carry, rows
+    if of_grounds is not None:
+        of_mean, of_grounds = (jax.tree.map(lambda x, i=i: x[i], of_grounds) for i in (0, _LATER))
+    summed = slopes.layers
     moments = summed.moments.reshape(2, -1, *summed.moments.shape[1:])
-
-    def joined(one, more):
-        return jnp.concatenate([one[None], more])
-
-    even_beams, odd_beams = map(joined, (mean.even_beams, mean.odd_beams), beams)
     gradient = ModeSum(
         tau=summed.tau,
-        coalbedo=coalbedo,
+        coalbedo=summed.coalbedo,
         sun_secants=summed.sun_secant,
-        view_secant=shared.view_secant,
+        view_secant=slopes.view_secant,
         moments=(moments[0], moments[1]),
-        beams=(even_beams, odd_beams),
-        ground=mean.ground,
-        grounds=grounds,
-        weights=joined(first, reflections),
+        beams=beams,
+        ground=of_mean,
+        grounds=of_grounds,
+        weights=reflections,
     )
     return value, gradient
 
 
 class _Mode(NamedTuple):
-    """Of a mode above 0."""
+    """Of one mode; its ground is None where modes but the first see a black one."""
 
-    odd: Float[Array, ""]
+    order: Order
     weight: Float[Array, "*batch"]
     ground: Bordered | None
     nodes: tuple[Array, Array]
@@ -182,38 +179,38 @@ class _Modes:
         even, odd = inputs.moments
         self.inputs = inputs
         both = jnp.concatenate([even, odd])
-        self.layers = Layers(inputs.tau, None, inputs.sun_secants, both)
-        self.layers_of_the_mean = self.layers._replace(coalbedo=inputs.coalbedo)
+        self.layers = Layers(inputs.tau, inputs.coalbedo, inputs.sun_secants, both)
         self.num_nodes = even.shape[1]
         self.num_streams = 2 * self.num_nodes
-        num_modes = inputs.weights.shape[0]
-        functions = node_functions(self.num_streams, num_modes)
-        self.nodes = tuple(
-            jnp.asarray(
-                np.stack([functions[m, (m + parity) % 2 :: 2].T for m in range(num_modes)]),
-                inputs.tau.dtype,
-            )
-            for parity in (0, 1)
-        )
+        self.num_modes = inputs.weights.shape[0]
+        functions = node_functions(self.num_streams, self.num_modes)
+        self.nodes = self._nodes(functions, 0), self._nodes(functions, 1)
 
-    def first(self) -> tuple[Array, Kernels, Bordered]:
-        """Whether it is odd, kernels and ground of mode 0."""
+    def _nodes(self, functions: np.ndarray, parity: int) -> Array:
+        """Functions at the nodes of the degrees of one parity of l + m, all modes."""
+        rows = [functions[m, (m + parity) % 2 :: 2].T for m in range(self.num_modes)]
+        return jnp.asarray(np.stack(rows), self.inputs.tau.dtype)
+
+    def all(self) -> _Mode:
+        """What differs from mode to mode, on the first axis."""
         x = self.inputs
-        kernels = _kernels([n[0] for n in self.nodes], [v[0] for v in x.beams])
-        return jnp.zeros((), x.tau.dtype), kernels, x.ground
+        number = jnp.arange(self.num_modes, dtype=x.tau.dtype)
+        order = Order(number % 2, (number == 0).astype(x.tau.dtype))
+        grounds = x.grounds
+        if grounds is not None:
+            grounds = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), x.ground, grounds)
+        return _Mode(order, x.weights, grounds, self.nodes, x.beams)
 
-    def others(self) -> _Mode:
-        x = self.inputs
-        odd = jnp.arange(1, x.weights.shape[0], dtype=x.tau.dtype) % 2
-        later = jax.tree.map(lambda table: table[1:], (self.nodes, x.beams))
-        return _Mode(odd, x.weights[1:], x.grounds, *later)
-
-    def seen_by(self, mode: _Mode) -> tuple[Array, Kernels, Bordered]:
-        """The same of a mode above 0."""
-        ground = mode.ground
-        if ground is None:
-            ground = black(jnp.ones_like(self.inputs.ground.diagonal), self.num_streams)
-        return mode.odd, _kernels(mode.nodes, mode.beams), ground
+    def ground(self, mode: _Mode, mean: bool | None = None) -> Bordered:
+        """Ground of a mode; `mean` tells whether it is the mean, where that is known."""
+        if mode.ground is not None:
+            return mode.ground
+        of_mean = self.inputs.ground
+        nothing = black(jnp.ones_like(of_mean.diagonal), self.num_streams)
+        if mean is not None:
+            return of_mean if mean else nothing
+        is_mean = mode.order.mean > 0
+        return jax.tree.map(lambda x, y: jnp.where(is_mean, x, y), of_mean, nothing)
 
 
 def _kernels(nodes, beams) -> Kernels:

@@ -1,19 +1,14 @@
 """Fluxes that the azimuthal mean knows: plane albedo, and the ground's part in a reflectance."""
 
-from functools import partial
-
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._batching import tile_size
-from .column import Column, Options, promoted, solved
-from .derivative import independent_columns
-from .program import GroundResponse, ground_response, plane_albedo
+from .column import promoted
+from .door import prepare, solve
+from .program import ground_response, plane_albedo
 from .surface import AnySurface
-from .toa_brf import prepare
 
 
 def toa_albedo(
@@ -54,7 +49,7 @@ def toa_albedo(
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return _plane_albedo(column, options)
+    return solve(plane_albedo, column, options, True)
 
 
 class SurfaceCoupling(eqx.Module):
@@ -147,22 +142,5 @@ def surface_coupling(
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    black, coupling, spherical = _ground_response(column, options, multiple_views)
+    black, coupling, spherical = solve(ground_response, column, options, multiple_views)
     return SurfaceCoupling(black, coupling, spherical, multiple_views)
-
-
-@partial(jax.jit, static_argnums=1)
-def _plane_albedo(column: Column, options: Options) -> Array:
-    solve = independent_columns(
-        lambda tile: plane_albedo(tile, options), tile_size(options.num_streams, column.tau.dtype)
-    )
-    return solved(column, True, solve)
-
-
-@partial(jax.jit, static_argnums=(1, 2))
-def _ground_response(column: Column, options: Options, multiple_views: bool) -> GroundResponse:
-    solve = independent_columns(
-        lambda tile: ground_response(tile, options),
-        tile_size(options.num_streams, column.tau.dtype),
-    )
-    return solved(column, multiple_views, solve)

@@ -11,7 +11,7 @@ import numpy as np
 from jax.core import Tracer
 
 from .._batching import on_every_device
-from .doublings import sufficient_doublings, unknown_doublings
+from .doublings import sufficient_doublings
 from .surface import AnySurface, Lambertian
 
 
@@ -56,7 +56,7 @@ class Options(NamedTuple):
     num_modes: int
     delta_m: bool
     tms: bool
-    num_doublings: int
+    num_doublings: int | None
 
 
 def promoted(**arguments: Any) -> Column:
@@ -134,11 +134,19 @@ def _leaves(column: Column) -> list[tuple[str, jax.Array]]:
     ]
 
 
-def choose_doublings(column: Column, num_streams: int) -> int:
-    """Smallest sufficient number for concrete layers and beams, enough for any when traced."""
-    beams = [column.mu] + ([column.mu0] if column.secant is None else [1 / column.secant])
-    if any(isinstance(x, Tracer) for x in (column.tau, *beams)):
-        return unknown_doublings(num_streams)
+def names(structure: Any) -> tuple[str, ...]:
+    """Argument that each leaf of a column belongs to."""
+    places = jax.tree.unflatten(structure, list(range(structure.num_leaves)))
+    return tuple(name for name, _ in _leaves(places))
+
+
+def choose_doublings(column: Column, num_streams: int) -> int | None:
+    """Smallest sufficient number for concrete layers and beams; None where they are traced."""
+    read = column.tau, column.mu, column.mu0 if column.secant is None else column.secant
+    if any(isinstance(x, Tracer) for x in read):
+        return None
+    sun = column.mu0 if column.secant is None else 1 / np.asarray(column.secant)
+    beams = [np.asarray(column.mu), np.asarray(sun)]
     if column.tau.size == 0:
         return 0
     min_mu = min(float(np.min(x)) for x in beams if x.size)

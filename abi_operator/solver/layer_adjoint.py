@@ -19,11 +19,27 @@ from .quotient import Quotient, minus_and_quotient
 _BY_FIELDS, _BY_FIELDS_OF_FEW, _FEW_NODES = 2, 1, 2
 
 
+class Order(NamedTuple):
+    """What tells one mode's layers from another's: 1 or 0, and not integers, which have no tangents
+    in a kernel.
+
+    Parameters
+    ----------
+    odd
+        Whether the order is odd.
+    mean
+        Whether this is the azimuthal mean, the only mode in which energy is kept.
+    """
+
+    odd: Float[Array, "*mode"]
+    mean: Float[Array, "*mode"]
+
+
 class Layer(NamedTuple):
     """What one mode sees of a layer; moments of even and of odd l + m."""
 
     tau: Float[Array, "*batch"]
-    coalbedo: Float[Array, "*batch"] | None
+    coalbedo: Float[Array, "*batch"]
     sun_secant: Float[Array, "*batch"]
     even: Float[Array, "degree *batch"]
     odd: Float[Array, "degree *batch"]
@@ -34,15 +50,18 @@ class Layer(NamedTuple):
 
     def matrices(
         self,
+        mean: Float[Array, ""] | bool,
         kernels: tuple[ModeKernels, ModeKernels],
         view_secant: Float[Array, "*batch"],
         single_scattering: bool,
     ) -> tuple[Bordered, Bordered]:
-        """A and the inverse of B."""
+        """A and the inverse of B; whether the mode is the mean may be known or a number."""
         secants = self.secants(view_secant)
         a = layer_matrix(kernels[0], self.even, secants, single_scattering)
-        if self.coalbedo is not None:
-            a = conservative(a, self.coalbedo)
+        if isinstance(mean, bool):
+            a = conservative(a, self.coalbedo) if mean else a
+        else:
+            a = jax.lax.cond(mean > 0, conservative, lambda a, _: a, a, self.coalbedo)
         return a, layer_matrix(kernels[1], self.odd, secants, single_scattering).inverse()
 
 
@@ -54,16 +73,16 @@ class Layers(NamedTuple):
     """
 
     tau: Float[Array, "layer *batch"]
-    coalbedo: Float[Array, "layer *batch"] | None
+    coalbedo: Float[Array, "layer *batch"]
     sun_secant: Float[Array, "layer *batch"]
     moments: Float[Array, "parity_and_layer degree *batch"]
 
     def layer(self, number: Array, odd: Array) -> Layer:
-        """One of them. Both arguments are not of integers, which have no tangents in a kernel."""
+        """One of them; neither argument is an integer (see `Order`)."""
         even_place, odd_place = self._places(number, odd)
         return Layer(
             read(self.tau, number),
-            None if self.coalbedo is None else read(self.coalbedo, number),
+            read(self.coalbedo, number),
             read(self.sun_secant, number),
             read(self.moments, even_place),
             read(self.moments, odd_place),
@@ -76,7 +95,7 @@ class Layers(NamedTuple):
             moments = _add(moments, place, added)
         return Layers(
             _add(self.tau, number, new.tau),
-            None if new.coalbedo is None else _add(self.coalbedo, number, new.coalbedo),
+            _add(self.coalbedo, number, new.coalbedo),
             _add(self.sun_secant, number, new.sun_secant),
             moments,
         )

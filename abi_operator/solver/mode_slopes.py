@@ -41,7 +41,7 @@ from .adding import top
 from .bordered import Bordered
 from .fields import Fields, pair
 from .layer import ModeKernels
-from .layer_adjoint import Layer, Layers, climb, descend
+from .layer_adjoint import Layer, Layers, Order, climb, descend
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 
 Kernels = tuple[ModeKernels, ModeKernels]
@@ -69,7 +69,7 @@ def mode_slopes(
     shared: Shared,
     num_doublings: int,
     single_scattering: bool,
-    odd: Float[Array, ""],
+    order: Order,
     kernels: Kernels,
     ground: Bordered,
     weight: Float[Array, "*batch"],
@@ -78,11 +78,11 @@ def mode_slopes(
 ) -> tuple[Float[Array, "*batch"], Any, Slopes]:
     """Reflection of a mode, and the slopes of `weight` times it, added to those of other modes.
 
-    `odd` is 1 or 0, as the mode is. `kept` is room for what is kept of all layers, given back
-    filled: modes that share it do not clear it, nor copy it, one after the other. Layers are read
-    and written inside the kernels: as inputs and outputs of a scan every array would be one more
-    kernel a layer. Matrices lie in it as one row each: LLVM unrolls a copy of 64 numbers whole,
-    number by number, before it could make vectors of it.
+    `kept` is `room` for what is kept of all layers, given back filled: modes that share it do not
+    clear it, nor copy it, one after the other. Layers are read and written inside the kernels: as
+    inputs and outputs of a scan every array would be one more kernel a layer. Matrices lie in it as
+    one row each: LLVM unrolls a copy of 64 numbers whole, number by number, before it could make
+    vectors of it.
     """
     layers, view_secant = shared
     num_layers, num_nodes = layers.tau.shape[0], layers.moments.shape[1]
@@ -99,12 +99,10 @@ def mode_slopes(
         alone = numbers.size == 1 or small_enough(num_nodes, dtype, **how)
         return function if alone else one_kernel(function, 1)
 
-    def put_on(stack, layer, kernels, view_secant):
-        a, p = layer.matrices(kernels, view_secant, single_scattering)
-        return climb(stack, a, p, layer.tau, num_doublings)
-
-    def put_on_and_keep(stack, kept, layers, number, odd, kernels, view_secant):
-        stack, new = put_on(stack, layers.layer(number, odd), kernels, view_secant)
+    def put_on_and_keep(stack, kept, layers, number, order, kernels, view_secant):
+        layer = layers.layer(number, order.odd)
+        a, p = layer.matrices(order.mean, kernels, view_secant, single_scattering)
+        stack, new = climb(stack, a, p, layer.tau, num_doublings)
         return stack, keep(kept, new, number)
 
     @partial(moved_at_once, in_parts=True)
@@ -114,42 +112,31 @@ def mode_slopes(
     put_one = compiled(put_on_and_keep, in_parts=True)
 
     def up(carry, number):
-        return put_one(*carry, layers, number, odd, kernels, view_secant), None
+        return put_one(*carry, layers, number, order, kernels, view_secant), None
 
-    first = layers.layer(numbers[0], odd)
-    shapes = jax.eval_shape(
-        lambda: jax.tree.map(
-            _joined, put_on(ground, first, kernels, view_secant)[1], is_leaf=_in_blocks
-        )
-    )
-    if kept is None:
-        # A number of its own in each: arrays of zeros would be one for XLA, and copied.
-        leaves, structure = jax.tree.flatten(shapes)
-        kept = structure.unflatten(
-            jnp.full((numbers.size, x.size), float(k), x.dtype) for k, x in enumerate(leaves)
-        )
+    shapes = _shapes_of_kept(num_nodes, layers.tau, num_doublings)
     (stack, kept), _ = jax.lax.scan(up, (ground, kept), numbers, reverse=True)
     reflection, fields = _fields_at_the_top(stack, weight)
 
-    def undo(fields, totals, layer, kept, kernels, view_secant):
+    def undo(fields, totals, layer, mean, kept, kernels, view_secant):
         # The beams' own entries of the stack are 1 whatever happens in it.
         fields = fields._replace(other=jnp.zeros_like(fields.other))
         secants = layer.secants(view_secant)
         fields, a_bar, p_bar = descend(fields, layer.tau, secants, kept, num_doublings)
         a, coalbedo = undo_matrix(
-            kernels[0], layer.even, secants, a_bar, single_scattering, layer.coalbedo
+            kernels[0], layer.even, secants, a_bar, single_scattering, layer.coalbedo, mean
         )
         b = undo_inverse(kernels[1], layer.odd, kept.b_inverse, p_bar, single_scattering)
         step = 0.5 / 2**num_doublings
         return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
 
     @compiled
-    def undo_one(carry, layers, kept, number, odd, kernels, view_secant):
+    def undo_one(carry, layers, kept, number, order, kernels, view_secant):
         fields, totals, slopes = carry
         own = entries(kept, number) if small_enough(num_nodes, dtype) else arrays(kept, number)
-        layer = layers.layer(number, odd)
-        fields, totals, new = undo(fields, totals, layer, own, kernels, view_secant)
-        return fields, totals, slopes.plus(number, odd, new)
+        layer = layers.layer(number, order.odd)
+        fields, totals, new = undo(fields, totals, layer, order.mean, own, kernels, view_secant)
+        return fields, totals, slopes.plus(number, order.odd, new)
 
     def entries(kept, number):
         place = number.astype(jnp.int32)
@@ -160,12 +147,35 @@ def mode_slopes(
         return jax.tree.map(as_array, entries(kept, number), is_leaf=is_entry)
 
     def down(carry, number):
-        return undo_one(carry, layers, kept, number, odd, kernels, view_secant), None
+        return undo_one(carry, layers, kept, number, order, kernels, view_secant), None
 
     start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
     carry, _ = jax.lax.scan(down, (fields, start, slopes.layers), numbers)
     fields, (even, odd, view), layers = carry
     return reflection, kept, Slopes(Shared(layers, view), even, odd, pair(1.0, [fields]))
+
+
+def room(like: Float[Array, "layer *batch"], num_nodes: int, num_doublings: int) -> Any:
+    """Room for what is kept of all layers, which are like these."""
+    # A number of its own in each: arrays of zeros would be one for XLA, and copied.
+    leaves, structure = jax.tree.flatten(_shapes_of_kept(num_nodes, like, num_doublings))
+    return structure.unflatten(
+        jnp.full((like.shape[0], x.size), float(k), x.dtype) for k, x in enumerate(leaves)
+    )
+
+
+def _shapes_of_kept(num_nodes: int, like: Array, num_doublings: int) -> Any:
+    """What `climb` keeps of one layer."""
+
+    def kept(like: Array) -> Any:
+        def array(*own: int) -> Array:
+            return jnp.zeros((*own, *like.shape[1:]), like.dtype)
+
+        matrix = Bordered(array(num_nodes, num_nodes), array(num_nodes, 2), array(2), array(1))
+        _, kept = climb(matrix, matrix, matrix, array(), num_doublings)
+        return jax.tree.map(_joined, kept, is_leaf=_in_blocks)
+
+    return jax.eval_shape(kept, like)
 
 
 def _in_blocks(x: Any) -> bool:
@@ -207,6 +217,5 @@ def _collected(step, tau, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
     h = tau * step
     secants = h * (a.secants + b.secants)
     beams = totals[0] + h * a.beams, totals[1] + h * b.beams
-    own = None if coalbedo is None else h * coalbedo
-    slopes = Layer(step * (a.h + b.h), own, secants[0], h * a.moments, h * b.moments)
+    slopes = Layer(step * (a.h + b.h), h * coalbedo, secants[0], h * a.moments, h * b.moments)
     return (*beams, totals[2] + secants[1]), slopes

@@ -7,6 +7,7 @@ Y_e they are P, of the impedance hQ with the half thickness h of that stage, of 
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -174,14 +175,15 @@ def undo_matrix(
     secants: Float[Array, "2 *batch"],
     bar: Bordered,
     single_scattering: bool,
-    coalbedo: Float[Array, "*batch"] | None = None,
-) -> tuple[MatrixSlopes, Float[Array, "*batch"] | None]:
-    """Pull-back of `layer_matrix`, and of `conservative` where there is a co-albedo.
+    coalbedo: Float[Array, "*batch"],
+    mean: Float[Array, ""],
+) -> tuple[MatrixSlopes, Float[Array, "*batch"]]:
+    """Pull-back of `layer_matrix`, and in the azimuthal mean of `conservative`.
 
     The matrix is linear in moments, secants and the constant or co-albedo on its diagonal: the
     products of these with their own slopes add up to its product with its cotangent.
     """
-    core, own, rest = _undo_diagonal(bar.core, coalbedo)
+    core, own, rest = _undo_diagonal(bar.core, coalbedo, mean)
     pairs, nodes = _on_pairs(kernels.nodes, core), _on_nodes(kernels.nodes, bar.border)
     corner = bar.corner if single_scattering else None
     slopes = _undo_products(
@@ -239,29 +241,27 @@ def _undo_inverse(pairs, nodes, beams, moments, p: Edge, p_bar: Edge, cores, cor
     return MatrixSlopes(-slope, -moments * to_beams, diagonal, h)
 
 
-def _undo_diagonal(core, coalbedo):
+def _undo_diagonal(core, coalbedo, mean):
+    """The core's cotangent, the co-albedo's slope, and the constants' own part of the product."""
     mu, weight = double_gauss(2 * core.shape[0])
     expand = (-1,) + (1,) * (core.ndim - 2)
     inverse_mu = np.asarray(1 / mu, core.dtype).reshape(expand)
-
-    @fenced
-    def plain(core):
-        return total([inverse_mu[i] * core[i, i] for i in range(core.shape[0])])
-
-    if coalbedo is None:
-        return core, None, plain(core)
     s = np.sqrt(weight * mu)
     ratio = np.asarray(s[None] / s[:, None], core.dtype).reshape(mu.size, *expand)
     eye = np.eye(mu.size, dtype=bool).reshape(mu.size, *expand)
 
     @fenced
-    def kept(core, coalbedo):
-        diagonal = jnp.stack([core[i, i] for i in range(core.shape[0])])
-        own = total(inverse_mu * diagonal)
-        others = core - diagonal[:, None] * ratio
-        return jnp.where(eye, 0, others), own, coalbedo * own
+    def own_part(core):
+        return total([inverse_mu[i] * core[i, i] for i in range(core.shape[0])])
 
-    return kept(core, coalbedo)
+    @fenced
+    def without(core):
+        diagonal = jnp.stack([core[i, i] for i in range(core.shape[0])])
+        return jnp.where(eye, 0, core - diagonal[:, None] * ratio)
+
+    own = own_part(core)
+    rest = jax.lax.cond(mean > 0, without, lambda core: core, core)
+    return rest, mean * own, own * jnp.where(mean > 0, coalbedo, 1)
 
 
 def _on_pairs(nodes, core):

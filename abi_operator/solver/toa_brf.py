@@ -1,23 +1,11 @@
 """The solver's door for reflectances: plane-parallel columns seen from the top."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .._batching import tile_size
-from .checks import check_arguments
-from .column import (
-    Column,
-    Options,
-    check_options,
-    check_shapes,
-    choose_doublings,
-    promoted,
-    solved,
-)
-from .derivative import independent_columns
+from .column import Column, Options, promoted
+from .door import prepare, solve
 from .program import emerging
 from .surface import AnySurface
 
@@ -121,50 +109,12 @@ def toa_brf(
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return _solve(column, options, multiple_views)
+    gradient = _view_by_view if multiple_views else None
+    return solve(_brf, column, options, multiple_views, gradient)
 
 
-def prepare(
-    column: Column,
-    *,
-    num_streams: int,
-    num_modes: int | None,
-    delta_m: bool,
-    single_scattering: str | None,
-    multiple_views: bool,
-    num_doublings: int | None,
-    check_values: bool,
-    checked: Column | None = None,
-) -> Options:
-    """What every door does with its promoted arguments before the program: check and choose.
-
-    Values are checked in `checked` where the column to solve is not what the caller gave.
-    """
-    check_options(num_streams, num_modes, single_scattering, num_doublings)
-    check_shapes(column, num_streams + 1 if delta_m else num_streams, multiple_views)
-    if check_values:
-        given = (column if checked is None else checked)._asdict()
-        summed = single_scattering == "tms" and column.phase_function is None
-        check_arguments({k: x for k, x in given.items() if x is not None}, series_summed=summed)
-    if num_doublings is None:
-        num_doublings = choose_doublings(column, num_streams)
-    return Options(
-        num_streams,
-        num_streams if num_modes is None else num_modes,
-        delta_m,
-        single_scattering == "tms",
-        num_doublings,
-    )
-
-
-@partial(jax.jit, static_argnums=(1, 2))
-def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
-    solve = independent_columns(
-        lambda tile: emerging(tile, options).brf,
-        tile_size(options.num_streams, column.tau.dtype),
-        partial(_view_by_view, options=options) if multiple_views else None,
-    )
-    return solved(column, multiple_views, solve)
+def _brf(tile: Column, options: Options) -> Array:
+    return emerging(tile, options).brf
 
 
 def _view_by_view(tile: Column, options: Options) -> tuple[Array, Column]:

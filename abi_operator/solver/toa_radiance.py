@@ -1,18 +1,13 @@
 """The solver's door for radiances: sunlight, thermal emission, or both in one solve."""
 
-from functools import partial
-
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from .._batching import tile_size
-from .column import Column, Options, promoted, solved
-from .derivative import independent_columns
+from .column import Column, Options, promoted
+from .door import prepare, solve
 from .program import emerging
 from .surface import AnySurface
-from .toa_brf import prepare
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
 _LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5
@@ -102,7 +97,7 @@ num_doublings, check_values
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return _solve(column, options, multiple_views)
+    return solve(_radiance, column, options, multiple_views)
 
 
 def _with_harmless_sun(column: Column) -> Column:
@@ -115,13 +110,8 @@ def _with_harmless_sun(column: Column) -> Column:
     return column._replace(mu0=xp.where(away, xp.asarray(_SOMEWHERE_ELSE, mu0.dtype), mu0))
 
 
-@partial(jax.jit, static_argnums=(1, 2))
-def _solve(column: Column, options: Options, multiple_views: bool) -> Array:
-    def radiance(tile: Column) -> Array:
-        brf, emitted = emerging(tile, options)
-        assert tile.solar_irradiance is not None
-        reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf
-        return reflected if emitted is None else reflected + emitted
-
-    solve = independent_columns(radiance, tile_size(options.num_streams, column.tau.dtype))
-    return solved(column, multiple_views, solve)
+def _radiance(tile: Column, options: Options) -> Array:
+    brf, emitted = emerging(tile, options)
+    assert tile.solar_irradiance is not None
+    reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf
+    return reflected if emitted is None else reflected + emitted

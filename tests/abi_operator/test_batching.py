@@ -65,29 +65,44 @@ def slopes_of_the_sum(*arguments):
 def in_two_axes(*arguments):
     return solve(*(x.reshape(2, -1, *x.shape[1:]) for x in arguments))
 
-odd = [x[:299] for x in given]
-cases = [(f, given) for f in (solve, slopes, in_a_loop, slopes_of_the_sum)]
-for function, arguments in [*cases, (in_two_axes, given), (solve, odd)]:
-    function = jax.jit(function)
-    shared = function(*arguments)
-    with jax.default_device(first):
-        alone = function(*arguments)
+def agree(shared, alone):
     for a, b in zip(jax.tree.leaves(shared), jax.tree.leaves(alone), strict=True):
-        assert b.devices() == {first}, b.devices()
         np.testing.assert_allclose(a, b, rtol=1e-11)  # tiles of other widths round differently
-assert solve(*given).devices() == {first, second}
 
 # Each device has its half from the beginning to the end.
-program = jax.jit(solve).lower(*given).compile().as_text()
+program = jax.jit(solve).lower(*given).compile()
 for exchange in ("all-gather", "all-to-all", "collective-permute", "all-reduce"):
-    assert exchange not in program, exchange
-assert len(solve(*(x[:40] for x in given)).devices()) == 1
+    assert exchange not in program.as_text(), exchange
+shared = program(*given)
+assert shared.devices() == {first, second}
+
+# What one device gives, of every column; the rest follows from that.
+with jax.default_device(first):
+    on_one, slopes_on_one = jax.jit(solve), jax.jit(slopes)
+    alone, alone_slopes = on_one(*given), slopes_on_one(*given)
+    alone_twice = on_one(*given[:3], alone, *given[4:])
+    of_tau, of_albedo = slopes_on_one(*given[:3], 0 * given[3] + given[3][0], *given[4:])
+for x in jax.tree.leaves((alone, alone_slopes, alone_twice, of_tau, of_albedo)):
+    assert x.devices() == {first}, x.devices()
+odd = [x[:299] for x in given]
+agree(shared, alone)
+agree(jax.jit(slopes)(*given), alone_slopes)
+agree(jax.jit(in_a_loop)(*given), alone_twice)
+agree(jax.jit(slopes_of_the_sum)(*given), (of_tau, of_albedo.sum()))
+agree(jax.jit(in_two_axes)(*given), alone.reshape(2, -1))
+agree(jax.jit(solve)(*odd), alone[:299])
+few = jax.jit(solve)(*(x[:40] for x in given))
+assert len(few.devices()) == 1
+agree(few, alone[:40])
+
+# Columns with values are cut into chunks, which need no devices.
+agree(solve(*given), alone)
 
 # An axis that the caller maps over devices is the caller's.
 mesh = jax.sharding.Mesh(np.asarray([first, second]), ("mine",))
 mine = jax.sharding.PartitionSpec("mine")
 shared = jax.shard_map(solve, mesh=mesh, in_specs=mine, out_specs=mine, check_vma=False)(*given)
-np.testing.assert_allclose(shared, solve(*given), rtol=1e-13)
+np.testing.assert_allclose(shared, program(*given), rtol=1e-13)
 """
 
 

@@ -2,6 +2,8 @@
 
 import os
 import shutil
+import subprocess
+import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from abi_operator import cli, scene, simulation
 from abi_operator.demo import write_demo
 from abi_operator.files import InputError, read_result
 from abi_operator.nomenclature import QUALITY_FLAGS
+from abi_operator.speed import default_cache_folder, usable_cores
 
 SIZE = 8
 
@@ -55,6 +58,7 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
     assert sorted(path.name for path in out.iterdir()) == ["inputs", picture, "result.nc"]
     assert f"wrote {out / 'result.nc'}" in outcome.output
     assert "64 pixels; flagged: none" in outcome.output
+    assert f"computed on {usable_cores()} core" in outcome.output
     with read_result(out / "result.nc") as result:
         assert result.sizes["time"] == 1 and result.sizes["band"] == 4
         assert result["brf"].dtype == np.float64 and np.isfinite(result["brf"]).all()
@@ -237,6 +241,55 @@ def test_other_packages_add_commands_and_finish_the_demo(invoke, tmp_path, capsy
     assert outcome.stdout.endswith(
         "finished with ['inputs', 'natural_color_2007-10-23T180000.png', 'result.nc']\n"
     )
+
+
+def test_every_command_may_keep_what_it_compiles(monkeypatch, capsys):
+    """Also those of other packages, unless told otherwise before or behind their names."""
+    entry = EntryPoint("greet", f"{__name__}:greet", "abi_operator.commands")
+    monkeypatch.setattr(cli, "entry_points", lambda group, name=None: [entry])
+    kept = []
+    monkeypatch.setattr(cli, "_prepare_process", kept.append)
+    for words in (["greet"], ["--no-cache", "greet"], ["greet", "--no-cache"], ["--help"]):
+        monkeypatch.setattr(sys, "argv", ["abi-operator", *words])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        assert end.value.code == 0
+    assert kept == [True, False, False]
+    text = capsys.readouterr().out
+    assert text.startswith(3 * "float64\n")
+    assert str(default_cache_folder()) in text and "--no-cache" in text
+
+
+PROCESS = """
+import os, sys
+import jax
+from abi_operator import _processor, cli
+sys.argv = ["abi-operator", *sys.argv[1:]]
+try:
+    cli.main()
+except SystemExit as end:
+    assert end.code == 2
+bits = _processor.vector_bits()
+assert bits is None or os.environ["XLA_FLAGS"] == f"--xla_cpu_prefer_vector_width={bits}"
+assert jax.config.jax_num_cpu_devices == -1
+print(jax.config.jax_compilation_cache_dir)
+"""
+
+
+@pytest.mark.parametrize("options", [[], ["--no-cache"]])
+def test_a_process_is_prepared_before_its_command(tmp_path, options):
+    ours = {k: v for k, v in os.environ.items() if k != "XLA_FLAGS" and not k.startswith("JAX_")}
+    paths = os.pathsep.join(p for p in sys.path if p)
+    outcome = subprocess.run(
+        [sys.executable, "-c", PROCESS, "jacobian", "check", tmp_path / "nothing", *options],
+        env=ours | {"XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+    )
+    assert outcome.returncode == 0 and "nothing" in outcome.stderr, outcome.stderr
+    folder = tmp_path / "abi-operator" / "compiled"
+    assert outcome.stdout.startswith("None" if options else str(folder))
+    assert folder.exists() == (not options)
 
 
 def greet() -> None:

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from states import stacked
 
 from abi_operator import BANDS, Geometry, State, brf, radiance, standard_atmosphere
 from abi_operator.optics import column_optics
@@ -47,9 +48,9 @@ def by_hand(state, band, **emission):
 
 def test_equals_the_solver_called_by_hand():
     state = make_state()
-    found = brf(state, SEEN, **OPTIONS)
+    found = brf(stacked([state, state]), SEEN, **OPTIONS)
     expected = [by_hand(state, band) for band in SEEN]
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    np.testing.assert_allclose(found, [expected] * 2, rtol=1e-12)
 
 
 @pytest.mark.slow

@@ -5,9 +5,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from programs import programs_anew
 from states import column
 
-from abi_operator import brf, optics_and_solver
+from abi_operator import bands_of_states, brf
 
 BANDS = ("C01",)
 OPTIONS = {"num_streams": 2, "num_modes": 1}
@@ -23,22 +24,36 @@ def columns(count=20):
 
 
 def test_tiles_do_not_show(monkeypatch):
-    """Values and slopes of 20 columns in three tiles are those of one."""
+    """Values and slopes of 20 columns in three tiles of one program are those of one tile.
+
+    And of three chunks of columns that can be read, which are as wide as tiles.
+    """
     state = columns()
 
-    def solved():
+    def solved(state):
         def total(state):
             values = brf(state, BANDS, num_doublings=3, **OPTIONS)
             return jnp.sum(values), values
 
         return jax.grad(total, has_aux=True)(state)
 
-    whole = solved()
-    monkeypatch.setattr(optics_and_solver, "tile_size", lambda *_: 1)
-    jax.clear_caches()
-    for a, b in zip(jax.tree.leaves(solved()), jax.tree.leaves(whole), strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-18)
-    jax.clear_caches()
+    whole = solved(state)
+    tiles = []
+    map_tiles = bands_of_states.map_tiles
+
+    def watched(function, leaves, width):
+        tiles.append((leaves[0].shape[-1], width))
+        return map_tiles(function, leaves, width)
+
+    monkeypatch.setattr(bands_of_states, "map_tiles", watched)
+    monkeypatch.setattr(bands_of_states, "tile_size", lambda *_: 1)
+    for solve, expected in ((jax.jit(lambda s: solved(s)), (20, 8)), (solved, (8, 8))):
+        programs_anew(monkeypatch)
+        tiles.clear()
+        found = solve(state)
+        assert set(tiles) == {expected}
+        for a, b in zip(jax.tree.leaves(found), jax.tree.leaves(whole), strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-18)
 
 
 def test_doublings_are_enough_or_the_column_is_not_a_number():

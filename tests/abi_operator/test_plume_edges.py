@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from states import stacked
 
 from abi_operator import (
     BANDS,
@@ -23,6 +24,8 @@ from abi_operator.optics import aerosol
 
 # Rounding of some ten additions and of a telescoping sum.
 ROUNDING = 1e-12
+# One program for a number of levels, where there would be one for every step of it.
+edged = jax.jit(with_plume_edges)
 
 
 def make_air(num_levels=27, base=1130.0, top=2890.0, highest=20e3):
@@ -48,6 +51,7 @@ def with_smoke(air, base, top):
     return eqx.tree_at(edges, air, (jnp.asarray(base), jnp.asarray(top)))
 
 
+@jax.jit
 def depths(air):
     """Optical depth of the smoke's layers in C01."""
     return aerosol(air, "smoke", BANDS["C01"]).tau[0]
@@ -56,13 +60,13 @@ def depths(air):
 def test_depth_is_extinction_times_thickness_on_any_levels():
     for air in (make_air(n) for n in (10, 27, 50)):
         coefficient = aerosol(make_air(2), "smoke", BANDS["C01"]).tau.sum()
-        for levels in (air, with_plume_edges(air)):
+        for levels in (air, edged(air)):
             np.testing.assert_allclose(depths(levels).sum(), coefficient, rtol=ROUNDING)
 
 
 def test_levels_are_at_the_edges_and_nothing_is_lost():
     air = make_air()
-    new = with_plume_edges(air)
+    new = edged(air)
     assert new.height.size == air.height.size + 4
     assert np.all(np.diff(new.height) < 0) and np.all(np.diff(new.pressure) > 0)
     for edge in (1130.0, 2890.0, 8050.0, 11060.0):
@@ -87,10 +91,22 @@ def test_levels_are_at_the_edges_and_nothing_is_lost():
 def test_new_levels_lie_where_a_standard_atmosphere_has_them():
     """Temperature is linear between levels, pressure exponential to what a layer's warmth is."""
     air = make_air(50)
-    new = with_plume_edges(air)
+    new = edged(air)
     fine = standard_atmosphere("us_standard", new.height)
     np.testing.assert_allclose(new.pressure, fine.pressure, rtol=2e-4)
     np.testing.assert_allclose(new.temperature, fine.temperature, atol=0.5)
+
+
+@jax.jit
+def new_levels(air, base, top):
+    """Air with levels at the edges of its smoke, and the slopes of its vapour to these."""
+
+    def vapour(base, top):
+        new = with_plume_edges(with_smoke(air, base, top))
+        return new.gases.vapour, new
+
+    slopes, new = jax.jacrev(vapour, argnums=(0, 1), has_aux=True)(base, top)
+    return new, slopes
 
 
 @pytest.mark.parametrize(
@@ -100,23 +116,20 @@ def test_new_levels_lie_where_a_standard_atmosphere_has_them():
 )
 def test_edges_anywhere_are_harmless(base, top):
     air = with_smoke(make_air(26), base, top)
-    new = with_plume_edges(air)
+    new, slopes = new_levels(air, base, top)
     assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(new))
     assert np.all(np.diff(new.height) <= 0) and np.all(np.diff(new.pressure) >= 0)
     np.testing.assert_allclose(depths(new).sum(), depths(air).sum(), rtol=1e-9)
     np.testing.assert_allclose(new.gases.vapour.sum(), air.gases.vapour.sum(), rtol=ROUNDING)
-    slopes = jax.jacrev(lambda x: with_plume_edges(with_smoke(air, *x)).gases.vapour)((base, top))
     assert all(np.all(np.isfinite(x)) for x in slopes)
 
 
 def test_batches_are_columns_and_air_without_plumes_stays():
     airs = [make_air(), with_smoke(make_air(), 400.0, 5000.0)]
     batch = jax.tree.map(lambda *x: jnp.stack(x), *airs)
-    together = with_plume_edges(batch)
+    together = edged(batch)
     for k, air in enumerate(airs):
-        for a, b in zip(
-            jax.tree.leaves(together), jax.tree.leaves(with_plume_edges(air)), strict=True
-        ):
+        for a, b in zip(jax.tree.leaves(together), jax.tree.leaves(edged(air)), strict=True):
             np.testing.assert_allclose(a[k], b, rtol=1e-14)
     clear = dataclasses.replace(make_air(), plumes={})
     assert with_plume_edges(clear) is clear
@@ -127,8 +140,33 @@ GEOMETRY = Geometry(jnp.asarray(0.7), jnp.asarray(0.5), jnp.asarray(2.0))
 
 
 def seen(air, bands=SIX):
-    state = State(air, dict.fromkeys(bands, jnp.asarray(0.15)), GEOMETRY)
-    return brf(state, bands, num_streams=2, num_doublings=4)
+    """Reflectances of airs stacked."""
+    count = air.height.shape[0]
+    grounds = dict.fromkeys(bands, jnp.full(count, 0.15))
+    geometry = jax.tree.map(lambda x: jnp.full(count, x), GEOMETRY)
+    return brf(State(air, grounds, geometry), bands, num_streams=2, num_doublings=4)
+
+
+def with_nothing_above(air, count=4):
+    """As many levels as edges are inserted, in a void above: the same program solves both."""
+
+    def levels(x):
+        return jnp.pad(x, (count, 0), mode="edge")
+
+    def layers(x):
+        return jnp.pad(x, (count, 0))
+
+    return dataclasses.replace(
+        air,
+        pressure=levels(air.pressure),
+        height=levels(air.height).at[:count].add(jnp.arange(count, 0.0, -1.0)),
+        temperature=levels(air.temperature),
+        gases=dataclasses.replace(
+            air.gases, vapour=layers(air.gases.vapour), ozone=layers(air.gases.ozone)
+        ),
+        liquid=jax.tree.map(layers, air.liquid),
+        hydrometeors=jax.tree.map(layers, air.hydrometeors),
+    )
 
 
 def test_reflectances_hardly_move():
@@ -138,7 +176,9 @@ def test_reflectances_hardly_move():
     above droplets, moves C01 by 4e-4.
     """
     air = make_air(51, base=1300.0)
-    np.testing.assert_allclose(seen(with_plume_edges(air)), seen(air), atol=1e-4)
+    new = edged(air)
+    before, after = seen(stacked([with_nothing_above(air), new]))
+    np.testing.assert_allclose(after, before, atol=1e-4)
 
 
 def test_derivatives_in_height():
@@ -146,22 +186,19 @@ def test_derivatives_in_height():
     air = make_air(26)  # every 792 m above the ground
 
     @jax.jit
+    @jax.vmap
     def of_edges(edges):
-        def one(e):
-            return seen(with_plume_edges(with_smoke(air, e[0], e[1])), ("C01",))[0]
+        return with_plume_edges(with_smoke(air, edges[0], edges[1]))
 
-        return jax.vmap(one)(edges)
-
-    slope = jax.jit(jax.grad(lambda e: of_edges(e[None])[0]))
     # Up for the base and down for the top, into the plume. [m] Levels keep some mm off.
     step = np.diag([0.5, -0.5])
-    for edges in (np.array([1130.0, 2890.0]), np.array([792.0, 2376.0])):
-        values = of_edges(
-            jnp.asarray(np.concatenate([edges[None], edges + step, edges + 2 * step]))
-        )
-        found = slope(jnp.asarray(edges))
+    places = np.array([[1130.0, 2890.0], [792.0, 2376.0]])
+    slopes = jax.grad(lambda edges: jnp.sum(seen(of_edges(edges), ("C01",))))(places)
+    moved = [np.concatenate([x[None], x + step, x + 2 * step]) for x in places]
+    each = np.asarray(seen(of_edges(np.concatenate(moved)), ("C01",))).reshape(len(places), 5)
+    for edges, found, values in zip(places, slopes, each, strict=True):
         # One-sided, to second order.
         one, two = values[1:3] - values[0], values[3:] - values[0]
         difference = (4 * one - two) / (2 * np.diag(step))
-        np.testing.assert_allclose(found, difference, rtol=1e-4)
+        np.testing.assert_allclose(found, difference, rtol=1e-4, err_msg=str(edges))
         assert np.abs(found).min() > 1e-8

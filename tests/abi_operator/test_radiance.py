@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from states import stacked
 
 from abi_operator import (
     Fire,
@@ -44,17 +45,22 @@ def without_gases(state):
     )
 
 
-def seen(state):
-    """Radiances by band; every test asks for the same, so that all share a program."""
-    return dict(zip(SEEN, np.asarray(radiance(state, SEEN, **OPTIONS)), strict=True))
+def seen(*states):
+    """Radiances of columns by band.
+
+    Every test asks for the same bands of a batch, so that there are two programs: with fires and
+    without.
+    """
+    return dict(zip(SEEN, np.asarray(radiance(stacked(states), SEEN, **OPTIONS)).T, strict=True))
 
 
 def test_without_emission_it_is_the_reflectance():
-    state, bands = make_state(), ("C02", "C06")
-    factors = reflectance_factor(state, bands, **OPTIONS)
-    for band, factor in zip(bands, factors, strict=True):
+    states, bands = [make_state(), make_state(albedo=0.5)], ("C02", "C06")
+    factors = reflectance_factor(stacked(states), bands, **OPTIONS)
+    found = seen(*states)
+    for band, factor in zip(bands, factors.T, strict=True):
         expected = factor * solar_irradiance(band, "GOES-16") / np.pi
-        np.testing.assert_allclose(seen(state)[band], expected, rtol=1e-13)
+        np.testing.assert_allclose(found[band], expected, rtol=1e-13)
 
 
 def test_isothermal_air_over_a_black_ground_is_a_black_body():
@@ -63,7 +69,7 @@ def test_isothermal_air_over_a_black_ground_is_a_black_body():
     state = dataclasses.replace(
         state, atmosphere=dataclasses.replace(state.atmosphere, temperature=warm)
     )
-    temperature = brightness_temperature(jnp.asarray(seen(state)["C07"]), "C07")
+    temperature = brightness_temperature(jnp.asarray(seen(state, state)["C07"]), "C07")
     # Nothing shines on its top, so it lacks what scattering sends back of that: 1e-5 of it.
     np.testing.assert_allclose(temperature, 300.0, atol=1e-3)
 
@@ -74,63 +80,66 @@ def test_a_ground_shines_through_thin_air():
         clear, atmosphere=dataclasses.replace(clear.atmosphere, pressure=1e-3 * LEVELS[::-1])
     )
     expected = 0.8 * in_band_radiance(jnp.asarray(300.0), "C07")
-    np.testing.assert_allclose(seen(clear)["C07"], expected, rtol=1e-5)
+    np.testing.assert_allclose(seen(clear, clear)["C07"], expected, rtol=1e-5)
 
 
 def test_gases_dim_a_fire_by_their_transmittance():
     hot = make_state(NIGHT, albedo=0.0, fire=Fire(jnp.asarray(0.04), jnp.asarray(900.0)))
     cold = dataclasses.replace(hot, fire=Fire(jnp.asarray(0.0), jnp.asarray(900.0)))
-    with_fire, without = seen(hot), seen(cold)
-    assert with_fire["C02"] == without["C02"] == 0
+    found = seen(hot, cold)
+    assert np.all(found["C02"] == 0)
     for name in ("C06", "C07"):
         absorbed = gas_absorption(hot.atmosphere, BANDS[name]) + rayleigh(
             hot.atmosphere, BANDS[name]
         )
         flames, ground = (in_band_radiance(jnp.asarray(t), name) for t in (900.0, 300.0))
         clear = transmittance(absorbed, 1 / hot.geometry.mu)
-        more = with_fire[name] - without[name]
+        more = found[name][0] - found[name][1]
         # What air scatters, 3e-4 of it at most, is not in the transmittance.
         np.testing.assert_allclose(more, clear * 0.04 * (flames - ground), rtol=1e-3)
 
 
 def test_a_small_fire_saturates_c07_and_not_c06():
     fire = Fire(jnp.asarray(0.04), jnp.asarray(750.0))
-    found = seen(make_state(albedo=0.1, fire=fire))
-    assert found["C07"] > range_ceiling("C07", "GOES-16")
-    assert found["C06"] < range_ceiling("C06", "GOES-16")
+    found = seen(*[make_state(albedo=0.1, fire=fire)] * 2)
+    assert np.all(found["C07"] > range_ceiling("C07", "GOES-16"))
+    assert np.all(found["C06"] < range_ceiling("C06", "GOES-16"))
 
 
 def test_batches_are_columns_and_night_is_dark():
     states = [make_state(DAY), make_state(NIGHT)]
-    batch = jax.tree.map(lambda *x: jnp.stack(x), *states)
-    found = radiance(batch, SEEN, **OPTIONS)
+    found = np.stack(list(seen(*states).values()), axis=1)
     for k, state in enumerate(states):
-        np.testing.assert_allclose(found[k], list(seen(state).values()), rtol=1e-12, atol=1e-15)
+        alone = radiance(state, SEEN, **OPTIONS)
+        np.testing.assert_allclose(found[k], alone, rtol=1e-12, atol=1e-15)
     assert found[1, 0] == found[1, 1] == 0
     assert found[1, 2] > 0
 
 
 def test_derivatives_in_temperatures_and_fire():
     state = make_state(fire=Fire(jnp.asarray(0.01), jnp.asarray(800.0)))
-
-    @jax.jit
-    def total(state):
-        return jnp.sum(radiance(state, ("C06", "C07"), **OPTIONS))
-
-    slopes = jax.jit(jax.grad(total))(state)
-    assert all(jnp.all(jnp.isfinite(x)) for x in jax.tree.leaves(slopes))
-    for read, step in (
+    moved = (
         (lambda s: s.fire.temperature, 1e-2),
         (lambda s: s.fire.fraction, 1e-5),
         (lambda s: s.surface_temperature, 1e-2),
         (lambda s: s.albedo["C07"], 1e-4),
-    ):
-        ends = []
+    )
+
+    def total(state):
+        return jnp.sum(radiance(state, SEEN, **OPTIONS)[..., 1:])
+
+    slopes = jax.grad(total)(stacked([state, state]))
+    assert all(jnp.all(jnp.isfinite(x)) for x in jax.tree.leaves(slopes))
+    ends = []
+    for read, step in moved:
         for sign in (1, -1):
             leaves, tree = jax.tree.flatten(state)
-            moved = [x + sign * step if x is read(state) else x for x in leaves]
-            ends.append(total(jax.tree.unflatten(tree, moved)))
-        difference = (ends[0] - ends[1]) / (2 * step)
+            leaves = [x + sign * step if x is read(state) else x for x in leaves]
+            ends.append(jax.tree.unflatten(tree, leaves))
+    found = seen(*ends)
+    totals = (found["C06"] + found["C07"]).reshape(-1, 2)
+    for (read, step), (above, below) in zip(moved, totals, strict=True):
+        difference = (above - below) / (2 * step)
         np.testing.assert_allclose(read(slopes), difference, rtol=1e-5)
 
 
@@ -146,7 +155,7 @@ def test_refused():
 
 def test_eight_bands_and_their_gases():
     state, every = make_state(), tuple(BANDS)
-    clear = dict(zip(every, brf(without_gases(state), every, **OPTIONS), strict=True))
-    dimmed = dict(zip(every, brf(state, every, **OPTIONS), strict=True))
+    both = brf(stacked([without_gases(state), state]), every, **OPTIONS)
+    clear, dimmed = (dict(zip(every, x, strict=True)) for x in both)
     assert all(dimmed[band] < clear[band] for band in BANDS)
     assert dimmed["C04"] < 0.01 < clear["C04"]  # vapour hides the ground

@@ -41,18 +41,22 @@ def test_noise_free_recovery(columns, forward, retrieved):
 
 @pytest.fixture(scope="module")
 def solve(forward):
-    """`invert` of one pixel, compiled once."""
-    return jax.jit(partial(invert, forward))
+    """`invert` of one pixel, mapped over three starts, compiled once."""
+    of_start = partial(invert, forward)
+    mapped = jax.jit(jax.vmap(of_start, in_axes=(None, None, 0, None)))
+    return lambda observation, state, starts, prior=None: mapped(observation, state, starts, prior)
 
 
 @pytest.mark.parametrize("index", [1, 6])
 def test_a_batch_is_its_pixels_one_by_one(columns, forward, retrieved, solve, index):
     observation, states, truth = columns
-    start = forward.vector.x(1.2 * truth[index])
-    one = solve(pixel(observation, index), pixel(states, index), start)
-    assert one.converged
-    np.testing.assert_allclose(one.x, retrieved.inversion.x[index], atol=CONVERGED)
-    np.testing.assert_allclose(one.covariance, retrieved.inversion.covariance[index], rtol=1e-5)
+    starts = forward.vector.x(np.array([1.2, 1.1, 0.95]) * truth[index])
+    found = solve(pixel(observation, index), pixel(states, index), starts)
+    assert np.all(found.converged)
+    for k in range(len(starts)):
+        one = pixel(found, k)
+        np.testing.assert_allclose(one.x, retrieved.inversion.x[index], atol=CONVERGED)
+        np.testing.assert_allclose(one.covariance, retrieved.inversion.covariance[index], rtol=1e-5)
 
 
 def test_posterior_covariance_is_that_of_the_jacobian(columns, forward, retrieved):
@@ -92,7 +96,8 @@ def test_a_prior_pulls_as_linear_theory_says(columns, forward, solve):
     observation, states, truth = columns
     x_true = np.asarray(forward.vector.x(truth[1]))
     with_prior = Prior(jnp.asarray(x_true + 1e-4), jnp.array([[1e-4]]))
-    solution = solve(pixel(observation, 1), pixel(states, 1), jnp.asarray(x_true), with_prior)
+    starts = jnp.stack([jnp.asarray(x_true)] * 3)
+    solution = pixel(solve(pixel(observation, 1), pixel(states, 1), starts, with_prior), 0)
     kernel = np.asarray(solution.averaging_kernel)
     assert 0.01 < kernel[0, 0] < 0.99
     expected = with_prior.x_prior + kernel @ (x_true - with_prior.x_prior)
@@ -101,10 +106,9 @@ def test_a_prior_pulls_as_linear_theory_says(columns, forward, solve):
     assert solution.prior_cost > 0
 
 
-def test_a_solution_can_be_mapped_over_starts(columns, forward):
+def test_a_solution_can_be_mapped_over_starts(columns, forward, solve):
     observation, states, truth = columns
     starts = forward.vector.x(jnp.array([0.1, 0.5, 1.5]))
-    solve = partial(invert, forward, pixel(observation, 1), pixel(states, 1))
-    solutions = jax.jit(jax.vmap(solve))(starts)
+    solutions = solve(pixel(observation, 1), pixel(states, 1), starts)
     np.testing.assert_allclose(forward.vector.aod_550(solutions.x), truth[1], atol=CONVERGED)
     assert len(BANDS) == observation.sigma.shape[1]

@@ -6,4 +6,5 @@ the terms of an exponential sum; `transmittance` of what it gives is that of the
 
 from .absorption import ALL_GASES as ALL_GASES
 from .absorption import gas_absorption as gas_absorption
+from .absorption import num_terms as num_terms
 from .absorption import transmittance as transmittance

@@ -2,16 +2,19 @@ r"""Layer amounts of absorbing gas, by which an absorption coefficient becomes a
 
 Each amount is additive: whatever the levels, the layers between two pressures hold the same (well
 mixed gases and columns exactly; vapour scaled by pressure or temperature as well as the mean of a
-layer stands for the layer). An amount is called with one `Atmosphere` and gives one number a layer.
+layer stands for the layer). `amounts_of` gives one number a layer for each.
 """
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...atmosphere import Atmosphere, Gases
 from ...constants import STANDARD_PRESSURE
+from ..pointwise import choose, pointwise
 
 
 def ozone_column(atmosphere: Atmosphere) -> Float[Array, " layer"]:
@@ -32,7 +35,9 @@ def self_broadened_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
     height; the whole column then has the square of its precipitable water.
     """
     layer = vapour_column(atmosphere)
-    below = jnp.cumsum(layer)
+    # A product: `jnp.cumsum` is a chain of kernels.
+    above = jnp.tri(layer.size, dtype=layer.dtype)
+    below = jnp.matmul(above, layer, precision=jax.lax.Precision.HIGHEST)
     return layer * (2 * below - layer)
 
 
@@ -54,49 +59,112 @@ class MixedGas(NamedTuple):
     """
 
     name: str | None
-    reference: float
-    exponent: float
+    reference: float | Array
+    exponent: float | Array
 
     def __call__(self, atmosphere: Atmosphere) -> Float[Array, " layer"]:
-        relative = atmosphere.pressure / STANDARD_PRESSURE
-        amount = jnp.diff(relative ** (1 + self.exponent))
+        return amounts_of(atmosphere, [self])[0]
+
+    def of_path(self, atmosphere: Atmosphere, path: Float[Array, " layer"]) -> Array:
+        """Amount, by that of a gas of which there is the mole fraction X_0."""
         if self.name is None:
-            return amount
-        return amount * (getattr(gases_of(atmosphere), self.name) / self.reference)
+            return path
+        return path * (getattr(gases_of(atmosphere), self.name) / self.reference)
 
 
 class ScaledVapour(NamedTuple):
-    r"""Vapour times powers of pressure and temperature at the middle of the layer. [kg m-2]
+    r"""Vapour times a power of pressure at the middle of the layer, :math:`u_k (p/p_0)^n`. [kg m-2]
+
+    Parameters
+    ----------
+    reference_pressure
+        Pressure :math:`p_0`. [Pa]
+    exponent
+        n. [-]
+    """
+
+    reference_pressure: float | Array
+    exponent: float | Array
+
+    def __call__(self, atmosphere: Atmosphere) -> Float[Array, " layer"]:
+        return amounts_of(atmosphere, [self])[0]
+
+    def of_path(self, atmosphere: Atmosphere, path: Float[Array, " layer"]) -> Array:
+        """Amount, by vapour times the power of pressure."""
+        return path
+
+
+class WarmVapour(NamedTuple):
+    r"""Scaled vapour times a parabola in temperature at the middle of the layer. [kg m-2]
 
     .. math:: u_k \left(\frac{p}{p_0}\right)^n (1 + a x + b x^2), \qquad
        x = \frac{T - 250\ \mathrm{K}}{250\ \mathrm{K}}
 
     Parameters
     ----------
-    reference_pressure
-        Pressure :math:`p_0`. [Pa]
-    exponent, linear, quadratic
-        n, a and b. [-]
+    reference_pressure, exponent
+        As of `ScaledVapour`. [Pa], [-]
+    linear, quadratic
+        a and b. [-]
     """
 
-    reference_pressure: float
-    exponent: float
-    linear: float = 0.0
-    quadratic: float = 0.0
+    reference_pressure: float | Array
+    exponent: float | Array
+    linear: float | Array
+    quadratic: float | Array
 
     def __call__(self, atmosphere: Atmosphere) -> Float[Array, " layer"]:
-        pressure = _middle(atmosphere.pressure) / self.reference_pressure
-        amount = gases_of(atmosphere).vapour * pressure**self.exponent
-        if not (self.linear or self.quadratic):
-            return amount
+        return amounts_of(atmosphere, [self])[0]
+
+    def of_path(self, atmosphere: Atmosphere, path: Float[Array, " layer"]) -> Array:
+        """Amount, by vapour times the power of pressure."""
         x = _middle(temperature_of(atmosphere)) / 250 - 1
-        return amount * (1 + x * (self.linear + x * self.quadratic))
+        return path * (1 + x * (self.linear + x * self.quadratic))
 
 
 def foreign_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
     r"""Vapour times density of air relative to 296 K and 1013.25 hPa. [kg m-2]"""
     relative = _middle(atmosphere.pressure) / STANDARD_PRESSURE
     return gases_of(atmosphere).vapour * relative * (296 / _middle(temperature_of(atmosphere)))
+
+
+Amount = Callable[[Atmosphere], Float[Array, " layer"]] | MixedGas | ScaledVapour | WarmVapour
+"""A function, or a power of pressure with numbers of its own."""
+
+
+def amounts_of(atmosphere: Atmosphere, wanted: Sequence[Amount]) -> list[Float[Array, " layer"]]:
+    """Amounts in the layers of one column, with the powers of pressure of all taken at once."""
+    by_levels = [x for x in wanted if isinstance(x, MixedGas)]
+    by_layers = [x for x in wanted if isinstance(x, ScaledVapour | WarmVapour)]
+    mixed = iter(_mixed_paths(atmosphere, by_levels) if by_levels else ())
+    scaled = iter(_vapour_paths(atmosphere, by_layers) if by_layers else ())
+    found = []
+    for amount in wanted:
+        if isinstance(amount, MixedGas):
+            found.append(amount.of_path(atmosphere, next(mixed)))
+        elif isinstance(amount, ScaledVapour | WarmVapour):
+            found.append(amount.of_path(atmosphere, next(scaled)))
+        else:
+            found.append(amount(atmosphere))
+    return found
+
+
+def _mixed_paths(atmosphere: Atmosphere, amounts: Sequence[MixedGas]) -> Sequence[Array]:
+    relative = atmosphere.pressure / STANDARD_PRESSURE
+    exponent = _column([x.exponent for x in amounts], relative)
+    return jnp.unstack(jnp.diff(relative * _power(relative[None], exponent)))
+
+
+def _vapour_paths(
+    atmosphere: Atmosphere, amounts: Sequence[ScaledVapour | WarmVapour]
+) -> Sequence[Array]:
+    pressure, vapour = _middle(atmosphere.pressure), gases_of(atmosphere).vapour
+    relative = pressure / _column([x.reference_pressure for x in amounts], pressure)
+    return jnp.unstack(vapour * _power(relative, _column([x.exponent for x in amounts], pressure)))
+
+
+def _column(numbers: Sequence[float | Array], like: Array) -> Float[Array, "amount 1"]:
+    return jnp.stack([jnp.asarray(x, like.dtype) for x in numbers])[:, None]
 
 
 def gases_of(atmosphere: Atmosphere) -> Gases:
@@ -111,6 +179,13 @@ def temperature_of(atmosphere: Atmosphere) -> Float[Array, " level"]:
     if atmosphere.temperature is None:
         raise ValueError("absorption by vapour in this band needs atmosphere.temperature.")
     return atmosphere.temperature
+
+
+@pointwise
+def _power(x: Array, exponent: Array) -> Array:
+    """Power of a number by an exponent, both 0 or more; where the number is 0, of slope 0."""
+    power = jnp.exp(exponent * jnp.log(choose(x > 0, x, 1.0)))
+    return choose(x > 0, power, (exponent == 0).astype(x.dtype))
 
 
 def _middle(level: Float[Array, " level"]) -> Float[Array, " layer"]:

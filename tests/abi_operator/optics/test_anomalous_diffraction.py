@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abi_operator.bands import BANDS
-from abi_operator.optics.anomalous_diffraction import corrections, mean_efficiencies
+from abi_operator.optics.anomalous_diffraction import corrections, matter, mean_efficiencies
 from abi_operator.optics.droplets import NU
 from abi_operator.optics.water import REFRACTIVE_INDEX
 
@@ -43,14 +43,14 @@ def quadrature(effective_radius_um, wavelength_um, index, nu):
 )
 def test_closed_form_against_quadrature(band, nu):
     wavelength, index = BANDS[band].wavelength_um, REFRACTIVE_INDEX[band]
-    values = mean_efficiencies(jnp.asarray(RADII), wavelength, index, nu)
+    values = mean_efficiencies(jnp.asarray(RADII), wavelength, matter(index), nu)
     expected = np.array([quadrature(radius, wavelength, index, nu) for radius in RADII]).T
     np.testing.assert_allclose(values, expected, rtol=CLOSED_FORM)
 
 
 def test_closed_form_of_a_strong_absorber():
     index = 1.35 - 0.1j
-    values = mean_efficiencies(jnp.asarray(RADII), 3.0, index, NU)
+    values = mean_efficiencies(jnp.asarray(RADII), 3.0, matter(index), NU)
     expected = np.array([quadrature(radius, 3.0, index, NU) for radius in RADII]).T
     np.testing.assert_allclose(values, expected, rtol=CLOSED_FORM)
 
@@ -76,7 +76,7 @@ ABSORPTION_ERROR = {"C03": 0.11, "C04": 0.10, "C05": 0.10, "C06": 0.10, "C07": 0
 def test_extinction_against_mie(droplet_mie, band):
     for radius, error in EXTINCTION_ERROR[band].items():
         q_ext, _ = mean_efficiencies(
-            jnp.asarray(radius), BANDS[band].wavelength_um, REFRACTIVE_INDEX[band], NU
+            jnp.asarray(radius), BANDS[band].wavelength_um, matter(REFRACTIVE_INDEX[band]), NU
         )
         np.testing.assert_allclose(q_ext, droplet_mie(band, radius)[0], rtol=error)
 
@@ -85,7 +85,7 @@ def test_extinction_against_mie(droplet_mie, band):
 @pytest.mark.parametrize("radius", [4.0, 6.0, 10.0, 20.0, 30.0])
 def test_absorption_against_mie(droplet_mie, band, radius):
     _, q_abs = mean_efficiencies(
-        jnp.asarray(radius), BANDS[band].wavelength_um, REFRACTIVE_INDEX[band], NU
+        jnp.asarray(radius), BANDS[band].wavelength_um, matter(REFRACTIVE_INDEX[band]), NU
     )
     np.testing.assert_allclose(q_abs, droplet_mie(band, radius)[1], rtol=ABSORPTION_ERROR[band])
 
@@ -94,7 +94,7 @@ def test_absorption_against_mie(droplet_mie, band, radius):
 @pytest.mark.parametrize("band", BANDS)
 def test_float32_keeps_weak_absorption(band):
     wavelength, index = BANDS[band].wavelength_um, REFRACTIVE_INDEX[band]
-    values = mean_efficiencies(jnp.asarray(RADII, jnp.float32), wavelength, index, NU)
+    values = mean_efficiencies(jnp.asarray(RADII, jnp.float32), wavelength, matter(index), NU)
     assert all(value.dtype == jnp.float32 for value in values)
     expected = np.array([quadrature(radius, wavelength, index, NU) for radius in RADII]).T
     np.testing.assert_allclose(values, expected, rtol=FLOAT32)
@@ -104,7 +104,7 @@ def test_float32_keeps_weak_absorption(band):
 def test_derivative_against_differences(band):
     def efficiencies(radius):
         wavelength, index = BANDS[band].wavelength_um, REFRACTIVE_INDEX[band]
-        return jnp.stack(mean_efficiencies(radius, wavelength, index, NU))
+        return jnp.stack(mean_efficiencies(radius, wavelength, matter(index), NU))
 
     forward = jax.jit(lambda radius: jax.jvp(efficiencies, (radius,), (jnp.ones_like(radius),)))
     radius, step = jnp.asarray(7.0), 1e-4
@@ -118,12 +118,12 @@ def test_shape_can_be_traced():
     wavelength, index = BANDS["C06"].wavelength_um, REFRACTIVE_INDEX["C06"]
 
     def efficiencies(nu):
-        return jnp.stack(mean_efficiencies(jnp.asarray(9.0), wavelength, index, nu))
+        return jnp.stack(mean_efficiencies(jnp.asarray(9.0), wavelength, matter(index), nu))
 
     # The value comes with the derivative: one compilation.
     forward = jax.jit(lambda nu: jax.jvp(efficiencies, (nu,), (jnp.ones_like(nu),)))
     nu, step = jnp.asarray(4.5), 1e-4
-    expected = mean_efficiencies(jnp.asarray(9.0), wavelength, index, 4.5)
+    expected = mean_efficiencies(jnp.asarray(9.0), wavelength, matter(index), 4.5)
     np.testing.assert_allclose(forward(nu)[0], expected, rtol=1e-12)
     differences = (forward(nu + step)[0] - forward(nu - step)[0]) / (2 * step)
     np.testing.assert_allclose(forward(nu)[1], differences, rtol=1e-5)
@@ -132,7 +132,7 @@ def test_shape_can_be_traced():
 def test_coefficients_of_crystals_take_the_place_of_those_of_spheres():
     wavelength, index, radius = BANDS["C04"].wavelength_um, 1.3 - 1e-5j, jnp.asarray(30.0)
     q_ext, q_abs = mean_efficiencies(
-        radius, wavelength, index, 0.0, internal_reflection=1.0, tunnelling_factor=0.0
+        radius, wavelength, matter(index), 0.0, internal_reflection=1.0, tunnelling_factor=0.0
     )
     # Without tunnelling, absorption that is weak is doubled by a1 = 1: Q_abs = 2 (8 pi k / 3) D,
     # where D by area is the effective diameter. What is missing is the square of Q_abs.

@@ -9,7 +9,7 @@ import pytest
 
 from abi_operator.bands import BANDS
 from abi_operator.microphysics.gamma import inverse_slope, mean_mass
-from abi_operator.optics.anomalous_diffraction import corrections, mean_efficiencies
+from abi_operator.optics.anomalous_diffraction import corrections, matter, mean_efficiencies
 from abi_operator.optics.gamma import (
     equivalent_shape,
     mean_mass_of_path,
@@ -93,7 +93,7 @@ def test_crystals_as_spheres_of_the_same_photon_path(name, band):
         q_ext = weight @ ((1 + tunnelling / 2) * diffraction + edge)
         q_abs = weight @ ((1 + a1 * (1 - absorbed) + tunnelling) * absorbed)
         shape = equivalent_shape(habit, nu)
-        values = mean_efficiencies(jnp.asarray(radius_um), wavelength_um, index, shape)
+        values = mean_efficiencies(jnp.asarray(radius_um), wavelength_um, matter(index), shape)
         np.testing.assert_allclose(values[0], q_ext, rtol=error)
         np.testing.assert_allclose(values[1], q_abs, rtol=0.003)
 

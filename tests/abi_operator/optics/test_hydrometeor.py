@@ -22,6 +22,7 @@ from abi_operator.optics.hydrometeor import (
     particle_radius,
 )
 from abi_operator.optics.ice import ice_asymmetry, ice_coalbedo, ice_mass_extinction
+from abi_operator.optics.ice_tables import FU
 from abi_operator.optics.rain import rain_asymmetry
 
 # Generalized effective size over effective radius: (2 / sqrt 3) / (3 / 4). [-]
@@ -86,15 +87,19 @@ def test_ice_against_fu(make_atmosphere, band):
     atmosphere = of_radius(make_atmosphere, "ice", [0.01], [60 / SIZE])
     optics = hydrometeor(atmosphere, "ice", BANDS[band])
     size = jnp.asarray(60.0)
-    np.testing.assert_allclose(optics.tau[0, 0], 0.01 * ice_mass_extinction(size, band), rtol=0.055)
-    np.testing.assert_allclose(optics.moments(2)[0, 1], ice_asymmetry(size, band), rtol=1e-9)
+    np.testing.assert_allclose(
+        optics.tau[0, 0], 0.01 * ice_mass_extinction(size, FU[band]), rtol=0.055
+    )
+    np.testing.assert_allclose(optics.moments(2)[0, 1], ice_asymmetry(size, FU[band]), rtol=1e-9)
     if band not in ("C01",):
-        ratio = (1 - optics.ssa[0, 0]) / ice_coalbedo(size, band)
+        ratio = (1 - optics.ssa[0, 0]) / ice_coalbedo(size, FU[band])
         assert 0.6 < ratio < 1.3
     fu = CLASSES | {"ice": CLASSES["ice"]._replace(efficiencies="fu1996")}
     optics = hydrometeor(atmosphere, "ice", BANDS[band], fu)
-    np.testing.assert_allclose(optics.tau[0, 0], 0.01 * ice_mass_extinction(size, band), rtol=1e-9)
-    np.testing.assert_allclose(1 - optics.ssa[0, 0], ice_coalbedo(size, band), rtol=1e-6)
+    np.testing.assert_allclose(
+        optics.tau[0, 0], 0.01 * ice_mass_extinction(size, FU[band]), rtol=1e-9
+    )
+    np.testing.assert_allclose(1 - optics.ssa[0, 0], ice_coalbedo(size, FU[band]), rtol=1e-6)
 
 
 def test_settings_of_a_class_are_used(make_atmosphere):

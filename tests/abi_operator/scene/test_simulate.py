@@ -18,7 +18,7 @@ from abi_operator.scene import (
 from abi_operator.scene.angles import sun_distance
 
 BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
-OPTIONS = {"num_streams": 2, "chunk_columns": 4}
+OPTIONS = {"num_streams": 2}
 # Sums in another order, as chunks of columns of other sizes are compiled to other programs.
 ROUNDING = 1e-10
 

@@ -7,14 +7,19 @@ import pytest
 from cdisort import MAX_ABSORPTION_DEPTH, cdisort_brf, cut
 from columns import simple_columns
 from forty_digits import forty_digit_brf
-from random_columns import random_columns
+from random_columns import MAX_LAYERS, NUM_MOMENTS, random_columns
 
 from abi_operator.solver import double_gauss, toa_brf
 
 SEED = 20071023
-NUM_COLUMNS = 500
 STUDY_COLUMNS = 5000
-STREAMS = (2, 4, 6, 8, 12, 16, 32)
+STUDY_STREAMS = (2, 4, 6, 8, 12, 16, 32)
+# Ordinary tests: a program is compiled for each, in half a minute for 16 streams, which are
+# compared with CDISORT in `test_published`.
+STREAMS = (2, 4, 8)
+NUM_COLUMNS = 64 * len(STREAMS)
+# What the solver chooses for these columns.
+NUM_DOUBLINGS = {4: 8, 8: 5}
 # Both solve the same equations; rounding sets them apart by 4e-11 in half of the columns and by
 # more than 3e-9 in one of a hundred.
 EQUIVALENCE = 1e-8
@@ -93,12 +98,12 @@ class Comparison:
         assert max(self.ours_from_exact, default=0.0) <= RIGHT
 
 
-def compare(count: int, corrected: bool) -> Comparison:
+def compare(count: int, corrected: bool, streams: tuple[int, ...]) -> Comparison:
     """Draw columns, a share for each number of streams, and compare them one by one."""
     rng = np.random.default_rng(SEED)
-    counts = np.diff(np.linspace(0, count, len(STREAMS) + 1).astype(int))
+    counts = np.diff(np.linspace(0, count, len(streams) + 1).astype(int))
     result = Comparison(count)
-    for num_streams, share in zip(STREAMS, counts, strict=True):
+    for num_streams, share in zip(streams, counts, strict=True):
         tau, *rest = random_columns(rng, share)
         was_cut = np.zeros(share, bool)
         if corrected:
@@ -108,13 +113,14 @@ def compare(count: int, corrected: bool) -> Comparison:
         ours = np.asarray(
             toa_brf(tau, *rest, num_streams=num_streams, single_scattering=scattering)
         )
+        thin = tau.sum(axis=1) < THINNEST
+        if corrected and thin.any():
+            assert_single_scattering(thin, tau, *rest, num_streams)
         for i in range(share):
             used = tau[i] > 0
             column = [tau[i][used], *(x[i][used] for x in rest[:2]), *(x[i] for x in rest[2:])]
             name = f"{num_streams}/{i}"
-            if tau[i].sum() < THINNEST:
-                if corrected:
-                    assert_single_scattering(column, num_streams)
+            if thin[i]:
                 exact = forty_digit_brf(*column, num_streams, corrected)
                 result.ours_from_exact.append(error(ours[i], exact))
                 result.thin.append(f"{name} total tau {tau[i].sum():.1e}")
@@ -154,27 +160,27 @@ def why(column, num_streams: int, corrected: bool) -> str:
     return JUDGED[2] if found and np.any(ssa == 1) else JUDGED[3]
 
 
-def assert_single_scattering(column, num_streams):
+def assert_single_scattering(thin, tau, ssa, moments, albedo, mu0, mu, azimuth, num_streams):
     """CDISORT returns 0 for a column this thin; over black ground the closed form is the judge."""
-    tau, ssa, moments, _, mu0, mu, azimuth = column
-    cosine = -mu * mu0 - np.sqrt((1 - mu**2) * (1 - mu0**2)) * np.cos(azimuth)
-    degrees = 2 * np.arange(moments.shape[-1]) + 1
-    phase = np.array([np.polynomial.legendre.legval(cosine, degrees * chi) for chi in moments])
-    expected = np.sum(ssa * tau * phase) / (4 * mu * mu0)
-    result = toa_brf(tau, ssa, moments, 0.0, mu0, mu, azimuth, num_streams=num_streams)
-    # What is attenuated, or scattered once more, is smaller by the slant optical depth.
-    slant = tau.sum() * (1 / mu + 1 / mu0)
-    np.testing.assert_allclose(result, expected, rtol=2 * slant)
+    # All columns, for the program that there is.
+    result = toa_brf(tau, ssa, moments, 0 * albedo, mu0, mu, azimuth, num_streams=num_streams)
+    for i in np.flatnonzero(thin):
+        cosine = -mu[i] * mu0[i] - np.sqrt((1 - mu[i] ** 2) * (1 - mu0[i] ** 2)) * np.cos(
+            azimuth[i]
+        )
+        degrees = 2 * np.arange(moments.shape[-1]) + 1
+        phase = np.array([np.polynomial.legendre.legval(cosine, degrees * x) for x in moments[i]])
+        expected = np.sum(ssa[i] * tau[i] * phase) / (4 * mu[i] * mu0[i])
+        # What is attenuated, or scattered once more, is smaller by the slant optical depth.
+        slant = tau[i].sum() * (1 / mu[i] + 1 / mu0[i])
+        np.testing.assert_allclose(result[i], expected, rtol=2 * slant)
 
 
-@pytest.mark.parametrize(
-    "corrected", [pytest.param(False, marks=pytest.mark.slow), True], ids=["delta-M", "TMS"]
-)
-def test_equals_cdisort_on_500_random_columns(corrected):
+def test_equals_cdisort_on_random_columns():
     """At most 1e-8 apart; excluded are only columns that CDISORT refuses or cuts off, or where 40
     digits show it wrong.
     """
-    comparison = compare(NUM_COLUMNS, corrected)
+    comparison = compare(NUM_COLUMNS, True, STREAMS)
     print(comparison.report())
     comparison.check()
 
@@ -183,29 +189,55 @@ def test_equals_cdisort_on_500_random_columns(corrected):
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("corrected", [False, True], ids=["delta-M", "TMS"])
 def test_equals_cdisort_on_5000_random_columns(corrected, scale):
-    """The same on ten times as many; `--scale` runs a share of them."""
-    comparison = compare(max(len(STREAMS), round(scale * STUDY_COLUMNS)), corrected)
+    """The same at more numbers of streams and without the correction; `--scale` runs a share."""
+    count = max(len(STUDY_STREAMS), round(scale * STUDY_COLUMNS))
+    comparison = compare(count, corrected, STUDY_STREAMS)
     print(comparison.report())
     comparison.check()
 
 
-@pytest.mark.parametrize("num_streams", [4, 8, 16])
-@pytest.mark.parametrize("corrected", [False, True], ids=["delta-M", "TMS"])
+def columns_under_nodes(num_streams):
+    """A column for each quadrature node, and more of them: as many, and as large, as the random
+    ones fill up to, so that both take one program.
+    """
+    nodes, _ = double_gauss(num_streams)
+    count, num_layers, num_moments = 16, 5, 65
+    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns(count, num_layers, num_moments)
+    mu0[: nodes.size] = nodes
+    mu[0] = mu0[0]
+    below, above = MAX_LAYERS - num_layers, NUM_MOMENTS - num_moments
+    tau, ssa = (np.pad(x, [(0, 0), (0, below)]) for x in (tau, ssa))
+    moments = np.pad(moments, [(0, 0), (0, below), (0, above)])
+    return nodes.size, (tau, ssa, moments, albedo, mu0, mu, azimuth)
+
+
+@pytest.mark.parametrize(
+    ("num_streams", "corrected"),
+    [
+        (4, True),
+        (8, True),
+        (4, False),
+        pytest.param(16, True, marks=pytest.mark.slow),
+        pytest.param(8, False, marks=pytest.mark.slow),
+        pytest.param(16, False, marks=pytest.mark.slow),
+    ],
+)
 def test_sun_at_a_quadrature_node(num_streams, corrected):
     """CDISORT refuses mu0 there, but can be interpolated; 40 digits need no interpolation."""
-    nodes, _ = double_gauss(num_streams)
-    tau, ssa, moments, albedo, _, mu, azimuth = simple_columns(count=len(nodes), num_moments=65)
-    mu0 = nodes
-    mu[0] = mu0[0]
-    scattering = "tms" if corrected else None
-    columns = tau, ssa, moments, albedo, mu0, mu, azimuth
-    ours = toa_brf(*columns, num_streams=num_streams, single_scattering=scattering)
-    for i in range(len(nodes)):
-        column = [x[i] for x in columns]
+    count, columns = columns_under_nodes(num_streams)
+    ours = toa_brf(
+        *columns,
+        num_streams=num_streams,
+        single_scattering="tms" if corrected else None,
+        num_doublings=NUM_DOUBLINGS.get(num_streams),
+    )
+    used = columns[0][0] > 0
+    for i in range(count):
+        column = [*(x[i][used] for x in columns[:3]), *(x[i] for x in columns[3:])]
         exact = forty_digit_brf(*column, num_streams, corrected)
         assert error(ours[i], exact) <= RIGHT
         around = [
-            cdisort_brf(*column[:4], mu0[i] * (1 + step), *column[5:], num_streams, corrected)
+            cdisort_brf(*column[:4], column[4] * (1 + step), *column[5:], num_streams, corrected)
             for step in (-4e-3, -2e-3, 2e-3, 4e-3)
         ]
         assert error(ours[i], np.dot(around, [-1 / 6, 2 / 3, 2 / 3, -1 / 6])) <= INTERPOLATION

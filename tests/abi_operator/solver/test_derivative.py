@@ -3,6 +3,8 @@
 The solver itself is here at few streams; the rest of its derivatives is in `test_gradients`.
 """
 
+from functools import cache
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -101,7 +103,13 @@ def backward(f):
 def test_first_derivatives_are_those_of_the_plain_program(f, compiled, transform, count):
     """In one tile, and in three of which the last is not full."""
     found = jax.jit(transform(f)) if compiled else transform(f)
-    close(found(columns(count)), transform(PLAIN)(columns(count)))
+    close(found(columns(count)), plain(transform, count))
+
+
+@cache
+def plain(transform, count):
+    """What the plain program gives: the same for each way to a gradient."""
+    return jax.jit(transform(PLAIN))(columns(count))
 
 
 @pytest.mark.parametrize("f", [BY_REVERSE, BY_HAND], ids=["default", "given gradient"])
@@ -109,7 +117,12 @@ def test_first_derivatives_are_those_of_the_plain_program(f, compiled, transform
 @pytest.mark.parametrize("inner", [jax.jacfwd, jax.jacrev])
 def test_second_derivatives_are_those_of_the_plain_program(f, outer, inner):
     found = jax.jit(outer(inner(f)))(columns())
-    close(found, outer(inner(PLAIN))(columns()))
+    close(found, plain_twice(outer, inner))
+
+
+@cache
+def plain_twice(outer, inner):
+    return jax.jit(outer(inner(PLAIN)))(columns())
 
 
 MAPPED = {
@@ -131,7 +144,12 @@ MAPPED = {
 @pytest.mark.parametrize("name", MAPPED)
 def test_one_column_mapped(f, name):
     given = batch_first(columns())
-    close(jax.jit(MAPPED[name](f))(given), jax.jit(MAPPED[name](PLAIN))(given))
+    close(jax.jit(MAPPED[name](f))(given), plain_mapped(name))
+
+
+@cache
+def plain_mapped(name):
+    return jax.jit(MAPPED[name](PLAIN))(batch_first(columns()))
 
 
 def descend(f):
@@ -171,13 +189,16 @@ def test_a_loop_of_gradients_has_a_derivative():
 
 def test_mapped_twice_and_a_batch_mapped_in_some_leaves():
     twice = jax.tree.map(lambda x: x.reshape(2, 5, *x.shape[1:]), batch_first(columns()))
-    close(jax.vmap(jax.vmap(BY_REVERSE))(twice), jax.vmap(jax.vmap(PLAIN))(twice))
+    found, expected = (jax.jit(jax.vmap(jax.vmap(f)))(twice) for f in (BY_REVERSE, PLAIN))
+    close(found, expected)
     given = columns()
     several = {"tau": jnp.stack([given["tau"], 2 * given["tau"]]), "ground": given["ground"]}
     axes = ({"tau": 0, "ground": None},)
     for transform in (lambda f: f, jax.jacfwd, jax.jacrev):
-        found = jax.vmap(transform(BY_REVERSE), in_axes=axes)(several)
-        close(found, jax.vmap(transform(PLAIN), in_axes=axes)(several))
+        found, expected = (
+            jax.jit(jax.vmap(transform(f), in_axes=axes))(several) for f in (BY_REVERSE, PLAIN)
+        )
+        close(found, expected)
 
 
 def test_both_modes_take_the_same_gradient():
@@ -247,22 +268,24 @@ def solver_columns(count):
     return [jnp.asarray(x) for x in simple_columns(count=count, num_layers=2, num_moments=5)]
 
 
-@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize("several", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_solver_mapped_is_the_batch_in_value_and_gradient(several):
-    """With one view and with two, of more columns than a tile has."""
-    given = solver_columns(300)
+    """With one view and with two: compiled as a whole of more columns than a tile has, and as the
+    batch in chunks.
+    """
+    given = solver_columns(100)
     if several:
         given[5:] = [jnp.stack([x, x / 2], axis=1) for x in given[5:]]
 
-    def function(*arguments):
-        return toa_brf(*arguments, multiple_views=several, **OPTIONS)
+    def total(*arguments):
+        values = toa_brf(*arguments, multiple_views=several, **OPTIONS)
+        return jnp.sum(values), values
 
-    every = tuple(range(len(given)))
-    mapped = jax.jit(jax.vmap(function))(*given)
-    np.testing.assert_allclose(mapped, function(*given), rtol=ROUNDING)
-    summed = jax.jit(jax.grad(lambda *x: jnp.sum(function(*x)), argnums=every))(*given)
-    one = jax.grad(lambda *x: jnp.sum(function(*x)), argnums=every)
-    close(jax.jit(jax.vmap(one))(*given), summed, rtol=REAL_ROUNDING)
+    both = jax.grad(total, argnums=tuple(range(len(given))), has_aux=True)
+    mapped, values = jax.jit(jax.vmap(both))(*given)
+    batch, expected = both(*given)
+    np.testing.assert_allclose(values, expected, rtol=ROUNDING)
+    close(mapped, batch, rtol=REAL_ROUNDING)
 
 
 def test_sunlight_and_emission_together():
@@ -276,9 +299,7 @@ def test_sunlight_and_emission_together():
             **OPTIONS,
         )  # fmt: skip
 
-    jacobians = [
-        jax.jit(j(radiance, argnums=(0, 1, 2)))(*sources) for j in (jax.jacfwd, jax.jacrev)
-    ]
+    jacobians = [j(radiance, argnums=(0, 1, 2))(*sources) for j in (jax.jacfwd, jax.jacrev)]
     close(*jacobians, rtol=BOTH_MODES)
     # Linear in the sources: Euler's theorem.
     sums = [

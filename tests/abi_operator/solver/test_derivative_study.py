@@ -91,7 +91,6 @@ def study(rng, columns, num_streams, single_scattering):
     smallest = min(columns[4].min(), columns[5].min())
     doublings = sufficient_doublings(columns[0].max(), smallest, num_streams)
 
-    @jax.jit
     def brf(*arguments):
         return toa_brf(
             *arguments,
@@ -100,13 +99,10 @@ def study(rng, columns, num_streams, single_scattering):
             single_scattering=single_scattering,
         )
 
-    @jax.jit
-    def value_and_gradients(*arguments):
-        value, pull_back = jax.vjp(brf, *arguments)
-        return value, pull_back(jnp.ones_like(value))
-
-    forward = jax.jit(lambda arguments, tangents: jax.jvp(brf, arguments, tangents)[1])
-    value, gradients = value_and_gradients(*columns)
+    arrays = [jnp.asarray(x) for x in columns]
+    value, pull_back = jax.vjp(brf, *arrays)
+    gradients = pull_back(jnp.ones_like(value))
+    _, forward = jax.linearize(brf, *arrays)
     value, gradients = np.asarray(value), [np.asarray(g) for g in gradients]
     assert np.isfinite(value).all()
     assert all(np.isfinite(g).all() for g in gradients)
@@ -119,7 +115,7 @@ def study(rng, columns, num_streams, single_scattering):
         slope = np.sum((gradients[k] * direction).reshape(count, -1), axis=1)
         tangents = [np.zeros_like(x) for x in columns]
         tangents[k] = direction
-        ahead = np.asarray(forward(tuple(columns), tuple(tangents)))
+        ahead = np.asarray(forward(*(jnp.asarray(x) for x in tangents)))
 
         step = steps[INPUTS[k]] / RATIO ** np.arange(NUM_STEPS)[:, None]
         defined = step[0] > 0  # not for mu = 1: see the tests of the zenith angle
@@ -208,7 +204,9 @@ def at_angles(num_streams, single_scattering):
     compiled = jax.jit(jax.value_and_grad(brf, argnums=(0, 1, 2, 3)))
 
     def value_and_slopes(sun, view, mu0_more=0.0, mu_more=0.0, azimuth=0.7):
-        value, slopes = compiled(sun, view, mu0_more, mu_more, azimuth)
+        # As arrays: numbers of Python and of NumPy would each be compiled for.
+        inputs = (jnp.asarray(x, float) for x in (sun, view, mu0_more, mu_more, azimuth))
+        value, slopes = compiled(*inputs)
         return float(value), [float(x) for x in slopes]
 
     return value_and_slopes

@@ -39,16 +39,12 @@ def test_finite_and_equal_in_both_modes_at_every_hard_place(num_streams):
     arguments = [jnp.asarray(x) for x in arguments]
     function = solver(num_streams, num_doublings=13)
 
-    @jax.jit
-    def value_and_gradients(*arguments):
-        value, pull_back = jax.vjp(function, *arguments)
-        return value, pull_back(jnp.ones_like(value))
-
-    value, reverse = value_and_gradients(*arguments)
+    value, pull_back = jax.vjp(function, *arguments)
+    value, reverse = jax.tree.map(np.asarray, (value, pull_back(jnp.ones_like(value))))
     assert np.all(np.isfinite(value)), dict(zip(names, value, strict=True))
     rng = np.random.default_rng(1)
     tangents = tuple(jnp.asarray(rng.normal(size=x.shape)) for x in arguments)
-    forward = jax.jit(lambda a, t: jax.jvp(function, a, t)[1])(tuple(arguments), tangents)
+    _, forward = jax.jvp(function, tuple(arguments), tangents)
     backward = 0
     for name, gradient, tangent in zip(INPUTS, reverse, tangents, strict=True):
         per_column = np.reshape(gradient, (len(names), -1))
@@ -58,17 +54,31 @@ def test_finite_and_equal_in_both_modes_at_every_hard_place(num_streams):
     np.testing.assert_allclose(forward, backward, rtol=MODES_AGREE)
 
 
-def test_vmap_of_jacobians_equals_the_gradient_of_the_batch():
-    """jacfwd and jacrev of one column, mapped; columns of a batch do not mix."""
+@pytest.mark.parametrize("jacobian", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize(
+    "compiled", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["", "compiled"]
+)
+def test_vmap_of_jacobians_equals_the_gradient_of_the_batch(jacobian, compiled):
+    """Of one column, mapped; columns of a batch do not mix.
+
+    Compiled, forward mode is also in the loop of Gauss and Newton below, and reverse mode in
+    `test_derivative`.
+    """
+    arguments, function = small_columns()
+    jit = jax.jit if compiled else lambda f: f
+    mapped = jit(jax.vmap(function))(*arguments)
+    np.testing.assert_allclose(mapped, function(*arguments), rtol=1e-13)
+    whole = jit(jax.grad(lambda *a: jnp.sum(function(*a)), argnums=ALL))(*arguments)
+    mapped = jit(jax.vmap(jacobian(function, argnums=ALL)))(*arguments)
+    for name, one, batch in zip(INPUTS, mapped, whole, strict=True):
+        atol = MODES_AGREE * np.abs(batch).max()
+        np.testing.assert_allclose(one, batch, rtol=MODES_AGREE, atol=atol, err_msg=name)
+
+
+def test_vmap_compiled_is_the_batch():
     arguments, function = small_columns()
     mapped = jax.jit(jax.vmap(function))(*arguments)
     np.testing.assert_allclose(mapped, function(*arguments), rtol=1e-13)
-    whole = jax.jit(jax.grad(lambda *a: jnp.sum(function(*a)), argnums=ALL))(*arguments)
-    for jacobian in (jax.jacfwd, jax.jacrev):
-        mapped = jax.jit(jax.vmap(jacobian(function, argnums=ALL)))(*arguments)
-        for name, one, batch in zip(INPUTS, mapped, whole, strict=True):
-            atol = MODES_AGREE * np.abs(batch).max()
-            np.testing.assert_allclose(one, batch, rtol=MODES_AGREE, atol=atol, err_msg=name)
 
 
 @pytest.mark.parametrize(
@@ -89,9 +99,8 @@ def test_second_derivatives(order):
         second = jax.jit(lambda *a: jax.jvp(gradient, a, direction)[1])(*arguments)
     else:
         second = jax.jit(jax.grad(slope, argnums=ALL))(*arguments)
-    first = jax.jit(gradient)
-    plus = first(*(x + STEP * d for x, d in zip(arguments, direction, strict=True)))
-    minus = first(*(x - STEP * d for x, d in zip(arguments, direction, strict=True)))
+    plus = gradient(*(x + STEP * d for x, d in zip(arguments, direction, strict=True)))
+    minus = gradient(*(x - STEP * d for x, d in zip(arguments, direction, strict=True)))
     for name, result, p, m in zip(INPUTS, second, plus, minus, strict=True):
         atol = DIFFERENCES_AGREE * np.abs(result).max()
         np.testing.assert_allclose(result, (p - m) / (2 * STEP), rtol=0, atol=atol, err_msg=name)

@@ -175,7 +175,11 @@ def test_the_judge_knows_a_grey_ground():
 
 @pytest.mark.parametrize(
     "ground, scattering, num_streams",
-    [(TILTED, "tms", 4), (VEGETATION, None, 4), (VEGETATION, "tms", 8)],
+    [
+        (TILTED, "tms", 4),
+        (VEGETATION, None, 4),
+        pytest.param(VEGETATION, "tms", 8, marks=pytest.mark.slow),
+    ],
     ids=["tilted-TMS-4", "vegetation-4", "vegetation-TMS-8"],
 )
 def test_grounds_that_depend_on_direction(ground, scattering, num_streams):
@@ -202,7 +206,11 @@ def test_a_constant_ground_is_lambertian():
 
 @pytest.mark.parametrize(
     "ground, scattering, delta_m",
-    [(None, "tms", True), (None, None, False), (VEGETATION, "tms", False)],
+    [
+        (None, "tms", True),
+        (None, None, False),
+        pytest.param(VEGETATION, "tms", False, marks=pytest.mark.slow),
+    ],
     ids=["lambertian-TMS", "lambertian-unscaled", "vegetation-TMS-unscaled"],
 )
 def test_secants_of_the_beam(ground, scattering, delta_m):
@@ -220,6 +228,7 @@ def test_secants_of_the_beam(ground, scattering, delta_m):
     assert_right(ours, judge_brf(arguments, ground, scattering == "tms", **options))
 
 
+@pytest.mark.slow  # with secants and thermal light it is below
 def test_several_views_in_one_call():
     arguments = (*columns()[:5], *views())
     ours = toa_brf(
@@ -236,7 +245,9 @@ THERMAL = {
 
 
 @pytest.mark.parametrize(
-    "ground, delta_m", [(None, True), (TILTED, False)], ids=["lambertian", "tilted-unscaled"]
+    "ground, delta_m",
+    [(None, True), pytest.param(TILTED, False, marks=pytest.mark.slow)],
+    ids=["lambertian", "tilted-unscaled"],
 )
 def test_thermal_light(ground, delta_m):
     """Levels, ground and sky shine, each alone and all together; the sun is below the horizon."""

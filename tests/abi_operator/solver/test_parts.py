@@ -115,34 +115,42 @@ def dense(matrix):
 def test_bordered_algebra_is_matrix_algebra(nodes):
     rng = np.random.default_rng(0)
     a, b, c = (random_bordered(rng, nodes) for _ in range(3))
-    np.testing.assert_allclose(dense(a.inverse()), np.linalg.inv(dense(a)), rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(dense(2.0 * a - b), 2 * dense(a) - dense(b))
+    factor = jnp.asarray(0.7)
+
+    @jax.jit
+    def algebra(a, b, c):
+        return (
+            a.inverse(),
+            2.0 * a - b,
+            minus_quotient([(2.0, c), (factor, a)], factor, a, b, a),
+            minus_quotient([(1.0, c)], factor, a, b, c),
+        )
+
+    inverted, combined, with_itself, with_another = (dense(x) for x in algebra(a, b, c))
+    np.testing.assert_allclose(inverted, np.linalg.inv(dense(a)), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(combined, 2 * dense(a) - dense(b))
     # The views' rows are found like the sun's column, right where the product is symmetric as
     # everywhere in the solver: here for left = right, where both factors are of symmetric kind.
-    factor = jnp.asarray(0.7)
     symmetric = dense(a) @ np.linalg.inv(dense(b)) @ dense(a)
-    difference = minus_quotient([(2.0, c), (factor, a)], factor, a, b, a)
     expected = 2 * dense(c) + 0.7 * dense(a) - 0.7 * symmetric
-    np.testing.assert_allclose(dense(difference), expected, rtol=1e-12, atol=1e-13)
-    difference = dense(minus_quotient([(1.0, c)], factor, a, b, c))
+    np.testing.assert_allclose(with_itself, expected, rtol=1e-12, atol=1e-13)
     expected = dense(c) - 0.7 * dense(a) @ np.linalg.inv(dense(b)) @ dense(c)
-    np.testing.assert_allclose(difference[:, nodes], expected[:, nodes], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(with_another[:, nodes], expected[:, nodes], rtol=1e-12, atol=1e-13)
     core = np.s_[:nodes, :nodes]
-    np.testing.assert_allclose(difference[core], expected[core], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(with_another[core], expected[core], rtol=1e-12, atol=1e-13)
 
 
 def test_kernels_read_the_same_alone_and_in_a_batch():
     rng = np.random.default_rng(1)
     batch = random_bordered(rng, batch=(5,)), random_bordered(rng, batch=(5,))
     tau = jnp.asarray(rng.uniform(0, 2, 5))
-    together = half_layer(*batch, tau, 2)[0].core
+    admittance = jax.jit(lambda *x: half_layer(*x, 2)[0].core)
+    together = admittance(*batch, tau)
     for i in range(5):
         a, b = (
             Bordered(*(x[..., i] for x in (m.core, m.border, m.diagonal, m.corner))) for m in batch
         )
-        np.testing.assert_allclose(
-            half_layer(a, b, tau[i], 2)[0].core, together[..., i], rtol=1e-12
-        )
+        np.testing.assert_allclose(admittance(a, b, tau[i]), together[..., i], rtol=1e-12)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
@@ -151,7 +159,8 @@ def test_inverse_of_positive_definite_matrices(n):
     root = rng.normal(size=(n, n, 7))
     a = jnp.asarray(np.einsum("ikb,jkb->ijb", root, root)) + jnp.eye(n)[..., None]
     identity = np.broadcast_to(np.eye(n)[..., None], a.shape)
-    np.testing.assert_allclose(matmul(a, inverse(a)), identity, atol=1e-12)
+    product = jax.jit(lambda a: matmul(a, inverse(a)))(a)
+    np.testing.assert_allclose(product, identity, atol=1e-12)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 6, 8, 12])
@@ -161,16 +170,15 @@ def test_quotients_of_positive_definite_matrices(n):
     root, change = rng.normal(size=(2, n, n, 7))
     a = jnp.asarray(np.einsum("ikb,jkb->ijb", root, root)) + jnp.eye(n)[..., None]
     rights = [jnp.asarray(rng.normal(size=(n, columns, 7))) for columns in (n, 2)]
-    found = [x.joined() for x in solve(a, rights)]
-    for x, right in zip(found, rights, strict=True):
-        np.testing.assert_allclose(matmul(a, x), right, atol=1e-11)
-
     da = jnp.asarray(change + np.swapaxes(change, 0, 1))
 
+    @jax.jit
     def along(step):
         return [x.joined() for x in solve(a + step * da, [r * (1 + step) for r in rights])]
 
-    slopes = jax.jvp(along, (0.0,), (1.0,))[1]
+    found, slopes = jax.jit(lambda step: jax.jvp(along, (step,), (1.0,)))(0.0)
+    for x, right in zip(found, rights, strict=True):
+        np.testing.assert_allclose(np.einsum("ijb,jkb->ikb", a, x), right, atol=1e-11)
     for slope, above, below in zip(slopes, along(1e-5), along(-1e-5), strict=True):
         scale = np.abs(slope).max()  # differences of 1e-5 are right to 1e-10 of what they divide
         np.testing.assert_allclose(slope, (above - below) / 2e-5, atol=1e-6 * scale)
@@ -224,7 +232,7 @@ def test_half_layer_is_tanh_up_to_the_reach_of_its_doublings(doublings):
     tau = jnp.asarray(2 * reach * np.linspace(1e-3, 1, 50))
     ones = jnp.ones((1, 1, 50))
     unit = Bordered(ones, 0 * jnp.ones((1, 2, 50)), jnp.ones((2, 50)), jnp.zeros((1, 50)))
-    admittance, impedance = half_layer(unit, unit, tau, doublings)
+    admittance, impedance = jax.jit(half_layer, static_argnums=3)(unit, unit, tau, doublings)
     h = np.asarray(tau) / 2
     for found, exact in ((admittance, np.tanh(h)), (impedance, h / np.tanh(h))):
         np.testing.assert_allclose(found.core[0, 0], exact, rtol=REACH_ERROR)

@@ -3,7 +3,6 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-import pytest
 from columns import simple_columns
 from surfaces import Bowl, Constant
 
@@ -13,7 +12,7 @@ from abi_operator.solver import Lambertian, toa_albedo, toa_brf, toa_radiance
 SAME_GROUND = 1e-12
 # The inverse of a few hundred well-conditioned matrices.
 ROUNDING = 1e-11
-OPTIONS = {"num_streams": 8, "num_doublings": 5}
+OPTIONS = {"num_streams": 4, "num_doublings": 4}
 
 
 def bowl(count=4):
@@ -21,10 +20,10 @@ def bowl(count=4):
     return Bowl(jnp.asarray(rng.uniform(0.1, 0.6, count)), jnp.asarray(rng.uniform(0, 0.8, count)))
 
 
-@pytest.mark.parametrize("scattering", ["tms", None])
-def test_a_constant_surface_is_lambertian(scattering):
+def test_a_constant_surface_is_lambertian():
+    """Without the exact single scattering; `test_judge` has it with."""
     tau, ssa, moments, albedo, *angles = simple_columns()
-    options = OPTIONS | {"single_scattering": scattering}
+    options = OPTIONS | {"single_scattering": None}
     plain = toa_brf(tau, ssa, moments, albedo, *angles, **options)
     for surface in (Constant(jnp.asarray(albedo)), Lambertian(jnp.asarray(albedo))):
         result = toa_brf(tau, ssa, moments, surface, *angles, **options)
@@ -42,7 +41,7 @@ def test_without_atmosphere_it_is_the_surface():
 def test_few_modes_leave_the_direct_reflection_alone():
     tau, ssa, moments, _, *angles = simple_columns()
     arguments = (1e-9 * tau, ssa, moments, bowl(), *angles)
-    few, all_modes = (toa_brf(*arguments, num_modes=m, **OPTIONS) for m in (1, 8))
+    few, all_modes = (toa_brf(*arguments, num_modes=m, **OPTIONS) for m in (1, None))
     # What meets both ground and air is smaller by the optical depth.
     np.testing.assert_allclose(few, all_modes, rtol=1e-7)
 
@@ -76,8 +75,9 @@ def test_surface_parameters_broadcast_and_have_derivatives():
     def total(surface):
         return jnp.sum(toa_brf(tau, ssa, moments, surface, *angles, **OPTIONS))
 
+    both = jax.value_and_grad(total)
     surface = Bowl(jnp.asarray([0.3]), jnp.asarray([0.5]))
-    value, slope = jax.value_and_grad(total)(surface)
+    value, slope = both(surface)
     step = 1e-6
     for name in ("albedo", "backscatter"):
         plus, minus = (
@@ -85,7 +85,7 @@ def test_surface_parameters_broadcast_and_have_derivatives():
                  | {name: getattr(surface, name) + sign * step})
             for sign in (1, -1)
         )  # fmt: skip
-        difference = (total(plus) - total(minus)) / (2 * step)
+        difference = (both(plus)[0] - both(minus)[0]) / (2 * step)
         # Rounding of a sum of four reflectances over the step.
         np.testing.assert_allclose(getattr(slope, name)[0], difference, rtol=1e-8)
     assert np.isfinite(value)
@@ -94,17 +94,19 @@ def test_surface_parameters_broadcast_and_have_derivatives():
 def test_a_ground_that_sends_everything_back_under_white_air_loses_nothing():
     tau, ssa, moments, _, mu0, *_ = simple_columns()
     white = Constant(jnp.ones(4))
-    albedo = toa_albedo(tau, np.ones_like(ssa), moments, white, mu0, num_streams=8)
+    albedo = toa_albedo(tau, np.ones_like(ssa), moments, white, mu0, num_streams=4)
     np.testing.assert_allclose(albedo, 1, rtol=SAME_GROUND)
 
 
 def test_emission_over_a_surface_obeys_kirchhoff():
-    """Under air at B everywhere a Lambertian ground of emission (1 - a) B shows B, by any name."""
+    """Under air at B everywhere a Lambertian ground of emission (1 - a) B shows B, by any name.
+
+    By the name of an albedo it is in `test_toa_radiance`.
+    """
     tau, ssa, moments, albedo, *angles = simple_columns()
-    for ground in (albedo, Constant(jnp.asarray(albedo))):
-        result = toa_radiance(
-            tau, ssa, moments, ground, *angles, solar_irradiance=0.0,
-            planck_levels=np.full((4, 6), 3.0), surface_emission=3 * (1 - albedo),
-            isotropic_top=3.0, **OPTIONS,
-        )  # fmt: skip
-        np.testing.assert_allclose(result, 3, rtol=1e-14)
+    result = toa_radiance(
+        tau, ssa, moments, Constant(jnp.asarray(albedo)), *angles, solar_irradiance=0.0,
+        planck_levels=np.full((4, 6), 3.0), surface_emission=3 * (1 - albedo),
+        isotropic_top=3.0, **OPTIONS,
+    )  # fmt: skip
+    np.testing.assert_allclose(result, 3, rtol=1e-14)

@@ -8,9 +8,19 @@ from columns import simple_columns
 
 from abi_operator.solver import toa_brf, toa_radiance
 
-OPTIONS = {"num_streams": 8, "num_doublings": 5}
+OPTIONS = {"num_streams": 4, "num_doublings": 4}
 # The start of a layer errs by 1e-12, and rounding adds up over five layers.
 SOLVED = 1e-11
+
+
+def hazy():
+    """The columns of all tests here, which so share few programs; moments enough to be checked."""
+    return simple_columns(num_moments=65)
+
+
+def sunny(irradiance):
+    """One for each column."""
+    return np.full(4, irradiance)
 
 
 def warm(num_levels=6, count=4, seed=8):
@@ -24,31 +34,45 @@ def warm(num_levels=6, count=4, seed=8):
 
 
 def test_sun_of_irradiance_pi_over_mu0_is_the_brf():
-    columns = simple_columns()
+    columns = hazy()
     radiance = toa_radiance(*columns, solar_irradiance=np.pi, **OPTIONS)
     np.testing.assert_allclose(radiance / columns[4], toa_brf(*columns, **OPTIONS), rtol=1e-14)
 
 
-def test_sun_and_emission_add():
-    columns, sources = simple_columns(), warm()
-    both = toa_radiance(*columns, solar_irradiance=5.0, **sources, **OPTIONS)
+@pytest.mark.parametrize(
+    "given_alone",
+    [
+        ("planck_levels", "surface_emission"),
+        pytest.param(("isotropic_top",), marks=pytest.mark.slow),
+    ],
+    ids=" ".join,
+)
+def test_sun_and_emission_add(given_alone):
+    columns, sources = hazy(), warm()
+    both = toa_radiance(*columns, solar_irradiance=sunny(5.0), **sources, **OPTIONS)
     sun = toa_radiance(*columns, solar_irradiance=5.0, **OPTIONS)
-    night = toa_radiance(*columns, solar_irradiance=0.0, **sources, **OPTIONS)
+    night = toa_radiance(*columns, solar_irradiance=sunny(0.0), **sources, **OPTIONS)
     np.testing.assert_allclose(both, sun + night, rtol=1e-13)
+    # Each source alone, first among others that are 0, then where no others are given.
+    dark = {name: 0 * x for name, x in sources.items()}
     parts = [
-        toa_radiance(*columns, solar_irradiance=0.0, **{name: x}, **OPTIONS)
+        toa_radiance(*columns, solar_irradiance=sunny(0.0), **(dark | {name: x}), **OPTIONS)
         for name, x in sources.items()
     ]
     np.testing.assert_allclose(sum(parts), night, rtol=1e-12)
+    for name in given_alone:
+        (part,) = (x for other, x in zip(sources, parts, strict=True) if other == name)
+        alone = toa_radiance(*columns, solar_irradiance=0.0, **{name: sources[name]}, **OPTIONS)
+        np.testing.assert_allclose(alone, part, rtol=1e-12, err_msg=name)
 
 
 def test_absorbing_air_follows_schwarzschild():
     r"""Without scattering, over black ground: each layer in closed form, :math:`e^{-\tau/\mu}`."""
-    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = hazy()
     sources = warm()
     result = toa_radiance(
         tau, 0 * ssa, moments, 0 * albedo, mu0, mu, azimuth,
-        solar_irradiance=0.0, **sources, num_streams=8,
+        solar_irradiance=sunny(0.0), **sources, num_streams=4,
     )  # fmt: skip
     planck, below = sources["planck_levels"], sources["surface_emission"]
     for i in reversed(range(tau.shape[1])):
@@ -63,100 +87,105 @@ def test_absorbing_air_follows_schwarzschild():
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("ssa", [0.0, 0.7, 1.0])
 def test_isothermal_black_body(ssa, albedo):
-    tau, _, moments, _, *angles = simple_columns()
+    tau, _, moments, _, *angles = hazy()
+    one = np.ones(4)
     result = toa_radiance(
-        tau, np.full(tau.shape, ssa), moments, albedo, *angles, solar_irradiance=0.0,
-        planck_levels=np.full((4, 6), 7.0), surface_emission=7 * (1 - albedo), isotropic_top=7.0,
-        **OPTIONS,
+        tau, np.full(tau.shape, ssa), moments, albedo * one, *angles, solar_irradiance=sunny(0.0),
+        planck_levels=np.full((4, 6), 7.0), surface_emission=7 * (1 - albedo) * one,
+        isotropic_top=7 * one, **OPTIONS,
     )  # fmt: skip
     np.testing.assert_allclose(result, 7, rtol=1e-14)
 
 
 def test_splitting_a_layer_where_the_planck_function_is_linear():
-    tau, ssa, moments, *rest = simple_columns()
+    tau, ssa, moments, *rest = hazy()
     sources = warm()
-    whole = toa_radiance(tau, ssa, moments, *rest, solar_irradiance=1.0, **sources, **OPTIONS)
+    sun = sunny(1.0)
+    whole = toa_radiance(tau, ssa, moments, *rest, solar_irradiance=sun, **sources, **OPTIONS)
     levels = sources["planck_levels"]
     finer = np.empty((4, 11))
     finer[:, 0::2], finer[:, 1::2] = levels, 0.5 * (levels[:, 1:] + levels[:, :-1])
     halves = [np.repeat(x, 2, axis=1) for x in (0.5 * tau, ssa, moments)]
     split = toa_radiance(
-        *halves, *rest, solar_irradiance=1.0, **(sources | {"planck_levels": finer}), **OPTIONS
+        *halves, *rest, solar_irradiance=sun, **(sources | {"planck_levels": finer}), **OPTIONS
     )
     np.testing.assert_allclose(split, whole, rtol=1e-10)
 
 
 def test_empty_layers_do_not_emit():
-    tau, ssa, moments, *rest = simple_columns()
+    tau, ssa, moments, *rest = hazy()
     sources = warm()
-    whole = toa_radiance(tau, ssa, moments, *rest, solar_irradiance=1.0, **sources, **OPTIONS)
-    empty = [np.insert(x, 2, 0.0, axis=1) for x in (tau, ssa, moments)]
+    sun = sunny(1.0)
+    whole = toa_radiance(tau, ssa, moments, *rest, solar_irradiance=sun, **sources, **OPTIONS)
+    places = [0, 2, 2, 4, 5]
+    empty = [np.insert(x, places, 0.0, axis=1) for x in (tau, ssa, moments)]
     level = sources["planck_levels"]
     # An empty layer lies between the level's value and another from which the next layer starts:
     # continuous levels make that the same value.
-    levels = np.insert(level, 2, level[:, 2], axis=1)
+    levels = np.insert(level, places, level[:, places], axis=1)
     result = toa_radiance(
-        *empty, *rest, solar_irradiance=1.0, **(sources | {"planck_levels": levels}), **OPTIONS
+        *empty, *rest, solar_irradiance=sun, **(sources | {"planck_levels": levels}), **OPTIONS
     )
     np.testing.assert_allclose(result, whole, rtol=1e-13)
 
 
 def test_at_night_the_sun_may_stand_anywhere():
-    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns(num_moments=65)
-    sources = warm()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = hazy()
+    sources, none = warm(), sunny(0.0)
 
-    def night(cosine, **options):
+    def night(cosine, sources=sources, irradiance=none, **options):
         return toa_radiance(
-            tau, ssa, moments, albedo, cosine, mu, azimuth, solar_irradiance=0.0, **sources,
-            num_streams=8, **options,
+            tau, ssa, moments, albedo, cosine, mu, azimuth, solar_irradiance=irradiance, **sources,
+            **(OPTIONS | options),
         )  # fmt: skip
 
-    day = night(mu0, num_doublings=9)
+    # In the sources too, for a program that is also the next test's.
+    slopes = jax.grad(lambda *x: jnp.sum(night(*x)), argnums=(0, 1, 2))
+    inputs = {name: jnp.asarray(x) for name, x in sources.items()}, jnp.asarray(none)
+    day = night(mu0)
     for cosine in (-mu0, 0 * mu0, 1e-300 + 0 * mu0):
-        result = night(cosine, num_doublings=9)
-        np.testing.assert_allclose(result, day, rtol=1e-13)
-        slopes = jax.grad(lambda c, k: jnp.sum(night(c, num_doublings=3)), argnums=0)(
-            jnp.asarray(cosine), 0
-        )
-        np.testing.assert_array_equal(slopes, 0)
-    np.testing.assert_allclose(night(-mu0, check_values=True), day, rtol=1e-10)
+        np.testing.assert_allclose(night(cosine), day, rtol=1e-13)
+        np.testing.assert_array_equal(slopes(jnp.asarray(cosine), *inputs)[0], 0)
+    checked = night(-mu0, num_doublings=None, check_values=True)
+    np.testing.assert_allclose(checked, day, rtol=1e-10)
 
 
 def test_derivatives_in_the_sources_are_the_linear_parts():
-    columns = [jnp.asarray(x) for x in simple_columns()]
+    columns = [jnp.asarray(x) for x in hazy()]
     sources = {name: jnp.asarray(x) for name, x in warm().items()}
     sources["solar_irradiance"] = jnp.full(4, 2.0)
 
-    def radiance(sources):
-        return toa_radiance(*columns, **sources, **OPTIONS)
+    def radiance(sources, mu0):
+        return toa_radiance(*columns[:4], mu0, *columns[5:], **sources, **OPTIONS)
 
-    value, slope = jax.jvp(radiance, (sources,), (sources,))
+    mu0 = columns[4]
+    value, slope = jax.jvp(radiance, (sources, mu0), (sources, 0 * mu0))
     np.testing.assert_allclose(slope, value, rtol=1e-13)  # homogeneous of degree one
-    back = jax.grad(lambda s: jnp.sum(radiance(s)))(sources)
+    back, _ = jax.grad(lambda *x: jnp.sum(radiance(*x)), argnums=(0, 1))(sources, mu0)
     total = sum(jnp.sum(back[name] * x) for name, x in sources.items())
     np.testing.assert_allclose(total, jnp.sum(value), rtol=1e-12)
 
 
 def test_several_views_in_one_solve():
-    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = hazy()
     sources = warm()
     views = np.stack([mu, mu0, np.full(4, 0.9)], axis=1)
     turned = np.stack([azimuth, 0 * azimuth, np.full(4, 2.5)], axis=1)
     together = toa_radiance(
-        tau, ssa, moments, albedo, mu0, views, turned, solar_irradiance=1.0, **sources,
+        tau, ssa, moments, albedo, mu0, views, turned, solar_irradiance=sunny(1.0), **sources,
         multiple_views=True, **OPTIONS,
     )  # fmt: skip
     assert together.shape == (4, 3)
     for i in range(3):
         alone = toa_radiance(
-            tau, ssa, moments, albedo, mu0, views[:, i], turned[:, i], solar_irradiance=1.0,
+            tau, ssa, moments, albedo, mu0, views[:, i], turned[:, i], solar_irradiance=sunny(1.0),
             **sources, **OPTIONS,
         )  # fmt: skip
         np.testing.assert_allclose(together[:, i], alone, rtol=1e-13)
 
 
 def test_shapes_of_the_sources_are_checked():
-    columns = simple_columns()
+    columns = hazy()
     for num_levels in (2, 5, 7):
         with pytest.raises(ValueError, match=f"one level more.* got {num_levels} levels for 5 lay"):
             toa_radiance(*columns, solar_irradiance=1.0, planck_levels=np.ones((4, num_levels)))

@@ -1,0 +1,158 @@
+"""Columns with values, in chunks of a few sizes and on every core.
+
+XLA compiles a program for one number of columns and runs it on one core. Where columns can be read
+(not under `jax.jit`) and live on a CPU, they are cut into chunks of one of a program's `widths`, as
+they lie in memory, and threads take one after the other. So a program is compiled for these sizes
+and for no other number of columns, whatever comes; and nothing has to be set before JAX starts.
+The last chunk of a size begins where it must to end with the last column: some columns are solved
+twice, but none is copied. Fewer columns than the smallest chunk has are filled up with copies.
+
+Chunks are compiled for the processor's widest vectors, unless ``XLA_FLAGS`` says how wide they are.
+"""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Array
+
+from ._processor import usable_cores, vector_bits
+
+_WIDTH_FLAG = "xla_cpu_prefer_vector_width"
+
+# What has been compiled: of several threads with a new program each would compile it.
+_compiled: set[Any] = set()
+
+
+def compiler_options() -> dict[str, int] | None:
+    """Options of `jax.jit` for the widest vectors, where the user has not chosen them."""
+    bits = vector_bits()
+    chosen = _WIDTH_FLAG in os.environ.get("XLA_FLAGS", "")
+    return None if bits is None or chosen else {_WIDTH_FLAG: bits}
+
+
+def can_be_cut(arrays: Sequence[Any]) -> bool:
+    """Whether columns lie on one CPU device, and nobody settles what runs where."""
+    settled = (
+        jax.default_backend() != "cpu"
+        or jax.config.jax_default_device is not None  # pyright: ignore[reportAttributeAccessIssue]
+        or not jax.sharding.get_abstract_mesh().empty
+        or jax.process_count() > 1
+    )
+    return not settled and all(len(x.devices()) == 1 for x in arrays if isinstance(x, jax.Array))
+
+
+def map_chunks(
+    function: Callable[[list[Array]], Any],
+    key: Any,
+    arrays: Sequence[Any],
+    own: Sequence[bool],
+    batch: tuple[int, ...],
+    widths: Sequence[int],
+) -> Any:
+    """Apply a compiled, batch-first `function` whose columns do not mix to chunks of columns.
+
+    Parameters
+    ----------
+    function
+        Of a list of arrays with the columns of a chunk on the first axis, or one for all where the
+        columns share it, to a pytree of arrays with the columns on the first axis.
+    key
+        What the function is compiled for, beside the shapes.
+    arrays
+        What it is applied to.
+    own
+        Which of them have an entry for each column.
+    batch
+        Shape that the batch has outside; one column or more.
+    widths
+        Numbers of columns of a chunk that it may be compiled for, rising.
+
+    Returns
+    -------
+    The results of all columns, in one array each, with the batch in its shape.
+    """
+    size = math.prod(batch)
+    host = [np.asarray(x) for x in arrays]
+    chunks = cut(size, widths, usable_cores())
+    x64 = jax.dtypes.canonicalize_dtype(np.float64) == np.float64
+    device = jax.local_devices()[0]
+    shapes = tuple(x.shape[each:] for x, each in zip(host, own, strict=True))
+
+    def solve(start: int, width: int) -> Any:
+        place = slice(start, start + width)
+        if start + width > size:
+            place = np.minimum(np.arange(start, start + width), size - 1)
+        some: list[Any] = [x[place] if each else x for x, each in zip(host, own, strict=True)]
+        # Settings of the caller's thread, not of this one.
+        with jax.enable_x64(x64), jax.default_device(device):
+            return jax.block_until_ready(function(some))
+
+    if len(chunks) == 1:
+        (chunk,) = chunks
+        found = {chunk: solve(*chunk)}
+        return found[chunk] if batch == (chunk[1],) else _joined(found, batch)
+
+    def known(width: int) -> bool:
+        return (key, shapes, width, x64) in _compiled
+
+    found = {c: solve(*c) for c in _first_of_each(chunks) if not known(c[1])}
+    _compiled.update((key, shapes, width, x64) for _, width in chunks)
+    rest = [c for c in chunks if c not in found]
+    found |= zip(rest, _threads(os.getpid()).map(lambda c: solve(*c), rest), strict=True)
+    return _joined(found, batch)
+
+
+def cut(size: int, widths: Sequence[int], num_cores: int) -> list[tuple[int, int]]:
+    """Start and width of each chunk.
+
+    Large chunks, as many on every core; smaller ones for what is left, so that cores end together.
+    """
+    *smaller, largest = widths
+    if not smaller or size == largest:
+        return _evenly(0, size, largest)
+    share = size // (largest * num_cores) * num_cores * largest
+    if size - share > largest * num_cores - smaller[-1]:
+        share = size  # no more columns twice than a small chunk has
+    chunks = _evenly(0, share, largest) if share else []
+    rest = size - share
+    if rest == 0:
+        return chunks
+    fitting = [w for w in smaller if w >= rest]
+    if fitting:
+        return [*chunks, (max(0, size - fitting[0]), fitting[0])]
+    return chunks + _evenly(share, rest, smaller[-1])
+
+
+def _evenly(start: int, count: int, width: int) -> list[tuple[int, int]]:
+    """Chunks of one width for `count` columns from `start` on."""
+    number = -(-count // width)
+    end = start + count
+    return [(max(0, min(start + k * width, end - width)), width) for k in range(number)]
+
+
+def _first_of_each(chunks: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    return list({width: (start, width) for start, width in reversed(chunks)}.values())
+
+
+@cache
+def _threads(_process: int) -> ThreadPoolExecutor:
+    """Threads of this process: one that was forked has none of its parent's."""
+    return ThreadPoolExecutor(usable_cores(), thread_name_prefix="abi-operator")
+
+
+def _joined(found: dict[tuple[int, int], Any], batch: tuple[int, ...]) -> Any:
+    """One array of the results of all chunks; put together here, where it needs no program."""
+    size = math.prod(batch)
+    some = next(iter(found.values()))
+    arrays = [np.empty((size, *x.shape[1:]), x.dtype) for x in jax.tree.leaves(some)]
+    for (start, width), result in found.items():
+        for array, part in zip(arrays, jax.tree.leaves(result), strict=True):
+            array[start : start + width] = np.asarray(part)[: size - start]
+    shaped = [jax.device_put(x.reshape((*batch, *x.shape[1:]))) for x in arrays]
+    return jax.tree.unflatten(jax.tree.structure(some), shaped)

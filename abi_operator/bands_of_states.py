@@ -1,0 +1,219 @@
+"""Optics and solver of states, a tile at a time: the program behind every band.
+
+The layers of a tile, with their long moments, are made where they are solved and gone when the next
+tile's turn comes; what is kept of a column is what it sends up, a number a band. Slopes work alike:
+a tile's program gives, beside the values, the slope of every band in every wanted leaf of the
+state, and no layers of any other tile exist.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._batching import map_tiles, on_every_device, tile_size
+from .atmosphere import State
+from .band_columns import BandColumns, columns_of_bands
+from .optics import num_terms
+from .solver import sufficient_doublings, toa_brf, toa_radiance
+
+TRACED_TAU = 1000.0
+"""Largest optical depth of a layer in columns that are solved without being read. [-]"""
+# Doublings that are right to 2e-8 for such layers, up to so many streams: against 14 doublings at
+# single-scattering albedos of 0.9 to 1, sun and satellite up to 87 degrees from the zenith.
+_TRACED_DOUBLINGS, _TRACED_STREAMS, _TRACED_MU = 6, 16, 0.05
+# Columns of the solver in a tile, in tiles of the solver: its own loop is inside.
+_SOLVER_TILES = 8
+# States are tiled by so many, which vector units take at a time.
+_VECTOR = 8
+
+Leaves = Sequence[Any]
+
+
+class Inputs(NamedTuple):
+    """What a program is given.
+
+    Parameters
+    ----------
+    state
+        What the columns hold, all leaves of one floating type and with the batch's axes first.
+    solar_irradiance
+        Of the bands that emit. [W m-2 um-1]
+    """
+
+    state: State
+    solar_irradiance: dict[str, Array]
+
+
+class Options(NamedTuple):
+    """What is static in a program.
+
+    Parameters
+    ----------
+    bands
+        Names of the bands.
+    emitting
+        Those of them of which the radiance is wanted and not the reflectance.
+    satellite
+        In whose responses they emit.
+    gases, num_streams, num_modes
+        As in `reflectance.brf`.
+    """
+
+    bands: tuple[str, ...]
+    emitting: tuple[str, ...]
+    satellite: str
+    gases: tuple[str, ...]
+    num_streams: int
+    num_modes: int | None
+
+
+def values(
+    leaves: Leaves, structure: Any, options: Options, num_axes: int, num_doublings: int | None
+) -> Array:
+    """Reflectance or radiance ``*batch band`` of states whose leaves have their batch's axes first.
+
+    Parameters
+    ----------
+    leaves, structure
+        Those of `Inputs`.
+    options
+        How to solve them.
+    num_axes
+        Axes of the batch.
+    num_doublings
+        Doublings of every layer; None where nothing is known of the layers.
+    """
+
+    def value(tile: Leaves) -> Array:
+        return _solved(_columns(tile, structure, options), options, num_doublings)
+
+    return _tiled(value, leaves, structure, options, num_axes)
+
+
+def values_and_slopes(
+    leaves: Leaves,
+    structure: Any,
+    options: Options,
+    num_axes: int,
+    num_doublings: int | None,
+    wanted: tuple[bool, ...],
+) -> tuple[Array, list[Array]]:
+    """Values, and the slopes ``*batch band *own`` of the leaves that are wanted."""
+
+    def both(tile: Leaves) -> tuple[Array, Leaves]:
+        # Each band has its own copy of what is wanted, so that one pull gives all bands' slopes.
+        def value(copies: Leaves) -> Array:
+            own = iter(copies)
+            merged = [next(own) if w else x for x, w in zip(tile, wanted, strict=True)]
+            columns = _columns(merged, structure, options, wanted)
+            return _solved(columns, options, num_doublings)
+
+        count = len(options.bands)
+        copies = [jnp.broadcast_to(x, (count, *x.shape)) for x in chosen(tile, wanted)]
+        found, pull_back = jax.vjp(value, copies)
+        return found, pull_back(jnp.ones_like(found))[0]
+
+    return _tiled(both, leaves, structure, options, num_axes)
+
+
+def chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
+    """Items that are wanted."""
+    return [item for item, use in zip(items, wanted, strict=True) if use]
+
+
+def _tiled(
+    function: Callable[[Leaves], Any],
+    leaves: Leaves,
+    structure: Any,
+    options: Options,
+    num_axes: int,
+) -> Any:
+    """`function` of leaves whose batch is last, tile by tile, with the batch's axes first again."""
+
+    def share(leaves: Leaves) -> Any:
+        batch = leaves[0].shape[:num_axes]
+        last = [_batch_last(x, num_axes) for x in leaves]
+        width = tile_of_states(leaves, structure, options)
+
+        def outward(x: Array) -> Array:
+            x = jnp.moveaxis(x, -1, 0)
+            return x.reshape(*batch, *x.shape[1:])
+
+        return jax.tree.map(outward, map_tiles(function, last, width))
+
+    return on_every_device(share, leaves, [num_axes > 0] * len(leaves))
+
+
+def tile_of_states(leaves: Leaves, structure: Any, options: Options) -> int:
+    """States that are solved together."""
+    tile = tile_size(options.num_streams, leaves[0].dtype)
+    columns = _num_columns(leaves, structure, options)
+    return _VECTOR * max(1, _SOLVER_TILES * tile // columns // _VECTOR)
+
+
+def _num_columns(leaves: Leaves, structure: Any, options: Options) -> int:
+    """Columns of the solver that one state is: the exponential terms of all bands."""
+    air = jax.tree.unflatten(structure, leaves).state.atmosphere
+    absorbing = options.gases if air.gases is not None else ()
+    return sum(num_terms(band, absorbing) for band in options.bands)
+
+
+def _batch_last(x: Array, num_axes: int) -> Array:
+    own = x.shape[num_axes:]
+    return jnp.moveaxis(x.reshape(-1, *own), 0, -1)
+
+
+def _columns(
+    tile: Leaves, structure: Any, options: Options, copied: Sequence[bool] | None = None
+) -> tuple[BandColumns, ...]:
+    """Solver's columns of a tile whose batch is last, with the axis of the batch first.
+
+    Of leaves that are `copied` each band has its own, along their first axis.
+    """
+    flags = [False] * len(tile) if copied is None else copied
+
+    def of_one(leaves: Leaves) -> tuple[BandColumns, ...]:
+        inputs = jax.tree.unflatten(structure, leaves)
+        return columns_of_bands(
+            inputs.state,
+            options.bands,
+            options.gases,
+            options.num_streams + 1,
+            per_band=tuple(jax.tree.unflatten(structure, flags)),
+            emitting=options.emitting,
+            solar_irradiance=inputs.solar_irradiance,
+            satellite=options.satellite,
+        )
+
+    return jax.vmap(of_one, in_axes=-1)(list(tile))
+
+
+def _solved(
+    groups: Sequence[BandColumns], options: Options, num_doublings: int | None
+) -> Float[Array, "band batch"]:
+    """One solve for the bands that have the same kind of ground and of light."""
+    number = _traced_doublings(options) if num_doublings is None else num_doublings
+    found = {}
+    for columns in groups:
+        door = toa_radiance if columns.emit else toa_brf
+        terms = door(
+            **columns.arguments,
+            num_streams=options.num_streams,
+            num_modes=options.num_modes,
+            num_doublings=number,
+        )
+        if num_doublings is None:
+            thick = jnp.any(columns.arguments["tau"] > TRACED_TAU, axis=-1)
+            terms = jnp.where(thick, jnp.nan, terms)
+        found |= columns.summed(terms)
+    return jnp.stack([found[band] for band in options.bands])
+
+
+def _traced_doublings(options: Options) -> int:
+    """Enough for layers up to `TRACED_TAU`."""
+    if options.num_streams <= _TRACED_STREAMS:
+        return _TRACED_DOUBLINGS
+    return sufficient_doublings(TRACED_TAU, _TRACED_MU, options.num_streams)

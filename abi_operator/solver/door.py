@@ -1,0 +1,122 @@
+"""What the solver's doors share: from promoted arguments to a program for any number of columns."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from .._batching import tile_size
+from .._door import Leaves, enter, slopes_by_reverse_mode
+from .checks import check_arguments
+from .column import (
+    Column,
+    Options,
+    check_options,
+    check_shapes,
+    choose_doublings,
+    names,
+    own_axes,
+    solved,
+)
+from .derivative import independent_columns
+from .doublings import unknown_doublings
+
+
+def prepare(
+    column: Column,
+    *,
+    num_streams: int,
+    num_modes: int | None,
+    delta_m: bool,
+    single_scattering: str | None,
+    multiple_views: bool,
+    num_doublings: int | None,
+    check_values: bool,
+    checked: Column | None = None,
+) -> Options:
+    """What every door does with its promoted arguments before the program: check and choose.
+
+    Values are checked in `checked` where the column to solve is not what the caller gave.
+    """
+    check_options(num_streams, num_modes, single_scattering, num_doublings)
+    check_shapes(column, num_streams + 1 if delta_m else num_streams, multiple_views)
+    if check_values:
+        given = (column if checked is None else checked)._asdict()
+        summed = single_scattering == "tms" and column.phase_function is None
+        check_arguments({k: x for k, x in given.items() if x is not None}, series_summed=summed)
+    if num_doublings is None:
+        num_doublings = choose_doublings(column, num_streams)
+    return Options(
+        num_streams,
+        num_streams if num_modes is None else num_modes,
+        delta_m,
+        single_scattering == "tms",
+        num_doublings,
+    )
+
+
+def solve(
+    tile: Callable[[Column, Options], Any],
+    column: Column,
+    options: Options,
+    multiple_views: bool,
+    gradient: Callable[[Column, Options], tuple[Any, Column]] | None = None,
+) -> Any:
+    """Solve columns, with derivatives, `jax.vmap` and threads as they are cheapest.
+
+    Parameters
+    ----------
+    tile
+        Maps columns whose batch is last (`column.aligned`) to a pytree of arrays ``*view batch``.
+    column, options, multiple_views
+        What to solve.
+    gradient
+        As in `independent_columns`, of `tile`.
+    """
+    leaves, structure = jax.tree.flatten(column)
+    return enter(_Program(tile, gradient, options, multiple_views, structure), leaves)
+
+
+class _Program(NamedTuple):
+    """`_door.Program` of the arguments of a door."""
+
+    tile: Callable[[Column, Options], Any]
+    gradient: Callable[[Column, Options], tuple[Any, Column]] | None
+    options: Options
+    multiple_views: bool
+    structure: Any
+
+    @property
+    def own_axes(self) -> tuple[int, ...]:
+        return tuple(len(own_axes(name, self.multiple_views)) for name in names(self.structure))
+
+    def known(self, leaves: Leaves) -> "_Program":
+        if self.options.num_doublings is not None:
+            return self
+        column = jax.tree.unflatten(self.structure, leaves)
+        number = choose_doublings(column, self.options.num_streams)
+        return self._replace(options=self.options._replace(num_doublings=number))
+
+    def unknown(self) -> "_Program":
+        if self.options.num_doublings is not None:
+            return self
+        number = unknown_doublings(self.options.num_streams)
+        return self._replace(options=self.options._replace(num_doublings=number))
+
+    def widths(self, leaves: Leaves) -> tuple[int, ...]:
+        tile = tile_size(self.options.num_streams, leaves[0].dtype)
+        return 8, tile, 8 * tile
+
+    def value(self, leaves: Leaves) -> Any:
+        column = jax.tree.unflatten(self.structure, leaves)
+        gradient = self.gradient
+        solve = independent_columns(
+            lambda tile: self.tile(tile, self.options),
+            tile_size(self.options.num_streams, jnp.result_type(*leaves)),
+            None if gradient is None else lambda tile: gradient(tile, self.options),
+        )
+        return solved(column, self.multiple_views, solve)
+
+    def value_and_slopes(self, leaves: Leaves, wanted: tuple[bool, ...]) -> tuple[Any, list[Any]]:
+        return slopes_by_reverse_mode(self.value, leaves, wanted, self.own_axes)
