@@ -10,6 +10,7 @@ All commands run in float64, with the processor's widest vectors, and keep what 
 threads, and so do the retrievals. More CPU devices of JAX would do nothing for either.
 """
 
+import gc
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -240,6 +241,9 @@ def _cache_folder() -> str:
 
 def _prepare_process(keep_programs: bool) -> None:
     """Settle what a process of our own computes with, before JAX starts."""
+    # Tracing makes many small objects that stay; a tenth of it is a search for some that do not.
+    gc.freeze()
+    gc.set_threshold(50_000)
     use_widest_vectors()
     if not keep_programs:
         jax.config.update("jax_enable_compilation_cache", False)

@@ -110,6 +110,10 @@ def use_compilation_cache(folder: str | os.PathLike[str] | None = None) -> Path 
     a `folder` is given; ``JAX_ENABLE_COMPILATION_CACHE=0`` switches all of it off. In a folder
     that cannot be written nothing is kept, which is a warning.
 
+    On processors with AVX-512, jaxlib 0.9 to 0.10.1 calls on stderr every program that it loads one
+    for another machine, for want of ``prefer-no-gather``, which no machine has. That is harmless;
+    earlier and later ones say nothing.
+
     Parameters
     ----------
     folder
