@@ -3,6 +3,7 @@
 Functions are written for one state; callers batch them with `jax.vmap`.
 """
 
+import dataclasses
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
@@ -102,6 +103,8 @@ def columns_of_bands(
     """
     inputs = state, dict(solar_irradiance or {})
     copied = jax.tree.map(lambda flag, x: jax.tree.map(lambda _: flag, x), per_band, inputs)
+    inputs, copied = ((with_plain_grounds(x), rest) for x, rest in (inputs, copied))
+    state = inputs[0]
     groups: dict[Any, list[int]] = {}
     for k, name in enumerate(bands):
         kind = name in emitting, jax.tree.structure(ground_of(state, name))
@@ -197,7 +200,16 @@ def _layers(state: State, band: SomeBand, gases: tuple[str, ...], num_moments: i
 
 def ground_of(state: State, band: AnyName) -> Any:
     """Albedo of a Lambertian ground, given as one or as a surface, or any other surface."""
-    ground = entry(state.albedo, band)
+    return _plain(entry(state.albedo, band))
+
+
+def with_plain_grounds(state: State) -> State:
+    """The same state, where a Lambertian surface is its albedo: one kind of ground, not two."""
+    grounds = {name: _plain(ground) for name, ground in state.albedo.items()}
+    return dataclasses.replace(state, albedo=grounds)
+
+
+def _plain(ground: Any) -> Any:
     return ground.albedo if isinstance(ground, Lambertian) else ground
 
 

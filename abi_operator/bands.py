@@ -150,10 +150,19 @@ def constants(of_name: Callable[[str], T], name: AnyName, dtype: Any) -> T:
 
 
 def entry(mapping: Mapping[str, T] | ByBand, name: AnyName) -> T:
-    """Entry of the band with a name; that it is there is checked by `first_missing`."""
+    """Entry of the band with a name; that it is there is checked by `first_missing`.
+
+    Raises
+    ------
+    ValueError
+        Where the band is one of several whose entries differ in kind, see `by_band`.
+    """
     if isinstance(mapping, ByBand):
         return mapping.own
-    return mapping[name if isinstance(name, str) else name.names[0]]
+    names = names_of(name)
+    if len(names) > 1:
+        raise ValueError(f"entries of bands {names} must be of one kind to be one batch.")
+    return mapping[names[0]]
 
 
 def by_band(tree: Any, copied: Any, names: Sequence[str]) -> tuple[Any, Any]:

@@ -99,7 +99,8 @@ class OpticalProperties(eqx.Module):
         def of_kind(shares: Array, phase: PhaseFunction) -> Array:
             return shares[:, None] * jnp.broadcast_to(phase.moments(num_moments), shape)
 
-        return jnp.where(np.arange(num_moments) == 0, 1, self._mean(of_kind))
+        found = jnp.broadcast_to(self._mean(of_kind), shape)
+        return jnp.where(np.arange(num_moments) == 0, 1, found)
 
     def phase_function(self, cos_scattering: Float[Array, ""]) -> Float[Array, " layer"]:
         """Phase function of the mixture, weighted by scattering; 0 where nothing scatters. [-]"""
@@ -107,10 +108,10 @@ class OpticalProperties(eqx.Module):
         def of_kind(shares: Array, phase: PhaseFunction) -> Array:
             return shares * phase(cos_scattering)
 
-        return self._mean(of_kind)
+        return jnp.broadcast_to(self._mean(of_kind), self.extinction.shape[1:])
 
     def _mean(self, of_kind: Callable[[Array, PhaseFunction], Array]) -> Array:
-        """Sum over the scatterers by their shares; what differs in numbers only is one batch."""
+        """Sum over the scatterers by their shares, those of a kind as one batch; 0 of none."""
         scattering = self.scattering
         inverse = safe_divide(jnp.ones_like(scattering), scattering)
         kinds: dict[Any, list[Scatterer]] = {}
@@ -123,4 +124,4 @@ class OpticalProperties(eqx.Module):
                 lambda *x: jnp.stack(jnp.broadcast_arrays(*x)), *(s.phase for s in same)
             )
             found += jnp.unstack(jax.vmap(of_kind)(shares, phases))
-        return sum(found[1:], start=found[0])
+        return sum(found[1:], start=found[0]) if found else jnp.zeros((), scattering.dtype)
