@@ -23,7 +23,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh, PartitionSpec
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array
 
 # A vector unit holds at most so many float64; tiles narrower than a few of these leave it idle.
@@ -111,6 +111,21 @@ def on_every_device(function: Callable[[Any], Any], columns: Any, divided: Seque
         return function(columns)
     specs = [_SHARE if own else PartitionSpec() for own in divided]
     return _divided(function, devices, jax.tree.unflatten(structure, specs))(columns)
+
+
+def announced(arrays: Sequence[Array], size: int) -> list[Array]:
+    """The same arrays, of `size` columns, which tell `jax.jit` that every CPU device takes a share.
+
+    Where columns are divided by an operation that is not traced inside until it is compiled,
+    `jax.jit` would not find the devices by itself.
+    """
+    devices = _devices(size)
+    given = list(arrays)
+    if len(devices) > 1:
+        everywhere = NamedSharding(Mesh(np.asarray(devices), ("device",)), PartitionSpec())
+        smallest = min(range(len(given)), key=lambda k: given[k].size)
+        given[smallest] = jax.lax.with_sharding_constraint(given[smallest], everywhere)
+    return given
 
 
 _SHARE = PartitionSpec("device")

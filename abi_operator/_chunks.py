@@ -93,18 +93,22 @@ def map_chunks(
         with jax.enable_x64(x64), jax.default_device(device):
             return jax.block_until_ready(function(some))
 
+    # Never in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives, would
+    # be part of what JAX knows a compiled program by.
+    threads = _threads(os.getpid())
     if len(chunks) == 1:
         (chunk,) = chunks
-        found = {chunk: solve(*chunk)}
+        found = {chunk: threads.submit(solve, *chunk).result()}
         return found[chunk] if batch == (chunk[1],) else _joined(found, batch)
 
     def known(width: int) -> bool:
         return (key, shapes, width, x64) in _compiled
 
-    found = {c: solve(*c) for c in _first_of_each(chunks) if not known(c[1])}
+    new = [c for c in _first_of_each(chunks) if not known(c[1])]
+    found = {c: threads.submit(solve, *c).result() for c in new}
     _compiled.update((key, shapes, width, x64) for _, width in chunks)
     rest = [c for c in chunks if c not in found]
-    found |= zip(rest, _threads(os.getpid()).map(lambda c: solve(*c), rest), strict=True)
+    found |= zip(rest, threads.map(lambda c: solve(*c), rest), strict=True)
     return _joined(found, batch)
 
 

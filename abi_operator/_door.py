@@ -17,11 +17,12 @@ from typing import Any, Protocol, Self
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
-from jax.custom_batching import custom_vmap
-from jax.custom_derivatives import SymbolicZero
+from jax.core import ShapedArray, Tracer
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Float
 
+from ._batching import announced
 from ._chunks import can_be_cut, compiler_options, map_chunks
 
 Leaves = Sequence[Any]
@@ -46,6 +47,10 @@ class Program(Protocol):
         """The program for columns that cannot be read."""
         ...
 
+    def own_result(self, leaves: Leaves) -> Any:
+        """What `value` gives of one column: a pytree of `jax.ShapeDtypeStruct`."""
+        ...
+
     def widths(self, leaves: Leaves) -> Sequence[int]:
         """Numbers of columns that are worth a program, rising."""
         ...
@@ -67,20 +72,117 @@ class Program(Protocol):
 
 def enter(program: Program, leaves: Leaves) -> Any:
     """Solve columns, differentiable in every argument and under every transformation of JAX."""
+    return _bound(program, "value", leaves)
+
+
+def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
+    """What is wanted of a program: at once of values, else as one operation of what is traced."""
     if not any(isinstance(x, Tracer) for x in leaves):
-        return _call(program, "value", leaves)
-    solution = jax.custom_jvp(lambda *x: _joining(program, "value", x))
+        return _call(program, what, leaves)
+    arrays = announced([jnp.asarray(x) for x in leaves], math.prod(_batch_of(program, leaves)))
+    found = _columns.bind(*arrays, program=program, what=what)
+    return jax.tree.unflatten(jax.tree.structure(_shapes(program, what, leaves)), found)
 
-    def rule(primals: Leaves, tangents: Leaves) -> tuple[Any, Any]:
-        wanted = tuple(_perturbs(x) for x in tangents)
-        value, slopes = _linearised(program, wanted, primals)
-        if not slopes:
-            return value, jax.tree.map(jnp.zeros_like, value)
+
+# One operation for all of a program. Traced, it is a name with shapes, and only what is left when
+# all transformations are done is traced inside, once: `jax.custom_jvp` and
+# `jax.custom_batching.custom_vmap` would trace it beforehand for every step of the way.
+_columns = Primitive("columns")
+_columns.multiple_results = True
+
+
+@_columns.def_impl
+def _impl(*leaves: Any, program: Program, what: Any) -> list[Array]:
+    return jax.tree.leaves(_call(program, what, leaves))
+
+
+@_columns.def_abstract_eval
+def _abstract_eval(*leaves: Any, program: Program, what: Any) -> list[ShapedArray]:
+    shapes = jax.tree.leaves(_shapes(program, what, leaves))
+    return [ShapedArray(x.shape, x.dtype) for x in shapes]
+
+
+def _batch_of(program: Program, leaves: Leaves) -> tuple[int, ...]:
+    """Shape of the batch that the arguments' own ones broadcast to."""
+    pairs = zip(leaves, program.own_axes, strict=True)
+    return np.broadcast_shapes(*(np.shape(x)[: np.ndim(x) - n] for x, n in pairs))
+
+
+def _shapes(program: Program, what: Any, leaves: Leaves) -> Any:
+    """Shapes of what is wanted of a program."""
+    axes, batch = program.own_axes, _batch_of(program, leaves)
+    own = program.own_result(leaves)
+
+    def with_batch(x: Any, *more: int) -> jax.ShapeDtypeStruct:
+        return jax.ShapeDtypeStruct((*batch, *more), x.dtype)
+
+    value = jax.tree.map(lambda x: with_batch(x, *x.shape), own)
+    if what == "value":
+        return value
+    count = sum(math.prod(x.shape) for x in jax.tree.leaves(own))
+    slopes = [
+        with_batch(x, count, *x.shape[x.ndim - n :])
+        for x, n, use in zip(leaves, axes, what, strict=True)
+        if use
+    ]
+    return value, slopes
+
+
+def _inlined(*leaves: Array, program: Program, what: Any) -> list[Array]:
+    return jax.tree.leaves(_jitted(what, False)(program.unknown(), list(leaves)))
+
+
+mlir.register_lowering(_columns, mlir.lower_fun(_inlined, multiple_results=True))
+
+
+def _jvp(primals: Leaves, tangents: Leaves, *, program: Program, what: Any) -> Any:
+    """Slopes beside values; second derivatives are JAX's own of the program of both."""
+    if what != "value":
+        fixed = _fixed(program, primals)
+        full = [_with_zeros(x, t) for x, t in zip(primals, tangents, strict=True)]
+
+        def both(*leaves: Array) -> list[Array]:
+            return jax.tree.leaves(_jitted(what, False)(fixed, list(leaves)))
+
+        return jax.jvp(both, tuple(primals), tuple(full))
+    wanted = tuple(_perturbs(x) for x in tangents)
+    if not any(wanted):
+        value = _bound(program, "value", primals)
+        change = jax.tree.map(jnp.zeros_like, value)
+    else:
+        value, slopes = _bound(program, wanted, primals)
         axes = tuple(n for n, use in zip(program.own_axes, wanted, strict=True) if use)
-        return value, _contracted(slopes, _chosen(tangents, wanted), value, axes)
+        change = _contracted(slopes, _chosen(tangents, wanted), value, axes)
+    return jax.tree.leaves(value), jax.tree.leaves(change)
 
-    solution.defjvp(rule, symbolic_zeros=True)
-    return solution(*leaves)
+
+ad.primitive_jvps[_columns] = _jvp
+
+
+def _with_zeros(primal: Array, tangent: Any) -> Any:
+    if not isinstance(tangent, ad.Zero):
+        return tangent
+    floating = jnp.issubdtype(primal.dtype, jnp.floating)
+    return np.zeros(primal.shape, primal.dtype if floating else jax.dtypes.float0)
+
+
+def _batch(leaves: Leaves, axes: Sequence[Any], *, program: Program, what: Any) -> Any:
+    """Axes that `jax.vmap` maps over are more axes of the batch."""
+    given = list(zip(leaves, axes, program.own_axes, strict=True))
+    num_axes = max(np.ndim(x) - own - (axis is not None) for x, axis, own in given)
+
+    def full(x: Array, axis: int | None, own: int) -> Array:
+        if axis is None:
+            return x
+        x = jnp.moveaxis(x, axis, 0)
+        shape = x.shape[0], *(1,) * (num_axes + own + 1 - x.ndim), *x.shape[1:]
+        return x if shape == x.shape else x.reshape(shape)
+
+    found = jax.tree.leaves(_bound(program, what, [full(*x) for x in given]))
+    return found, [0] * len(found)
+
+
+batching.primitive_batchers[_columns] = _batch
 
 
 def _chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
@@ -89,7 +191,7 @@ def _chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
 
 def _perturbs(tangent: Any) -> bool:
     """Whether there is a derivative to take: not for constants, nor for integers."""
-    return not isinstance(tangent, SymbolicZero) and tangent.dtype != jax.dtypes.float0
+    return not isinstance(tangent, ad.Zero) and tangent.dtype != jax.dtypes.float0
 
 
 @partial(jax.jit, static_argnums=3)
@@ -107,51 +209,6 @@ def _contracted(slopes: Leaves, tangents: Leaves, value: Any, own_axes: tuple[in
     return jax.tree.unflatten(
         structure, [part.reshape(x.shape) for part, x in zip(parts, leaves, strict=True)]
     )
-
-
-def _linearised(program: Program, wanted: tuple[bool, ...], leaves: Leaves) -> Any:
-    """Value and slopes, which can be differentiated again.
-
-    Second derivatives are JAX's own of the program for the columns that there are.
-    """
-    joining = jax.custom_jvp(lambda *x: _joining(program, wanted, x))
-
-    @joining.defjvp
-    def _(primals: Leaves, tangents: Leaves) -> tuple[Any, Any]:
-        fixed = _fixed(program, primals)
-        return jax.jvp(lambda *x: _jitted(wanted, False)(fixed, list(x)), primals, tangents)
-
-    return joining(*leaves)
-
-
-def _joining(program: Program, what: Any, leaves: Leaves) -> Any:
-    """The program, with axes that `jax.vmap` maps over as more axes of its batch.
-
-    `jax.custom_batching.custom_vmap` alone has no derivatives.
-    """
-    if not any(isinstance(x, Tracer) for x in leaves):
-        return _call(program, what, leaves)
-    fixed = program.unknown()
-
-    @custom_vmap
-    def joined(leaves: Leaves) -> Any:
-        return _jitted(what, False)(fixed, leaves)
-
-    @joined.def_vmap
-    def _(size: int, is_mapped: list[list[bool]], leaves: Leaves) -> tuple[Any, Any]:
-        num_axes = max(x.ndim - own - m for x, own, m in _with_axes(program, leaves, is_mapped[0]))
-        full = [
-            x.reshape(size, *(1,) * (num_axes + own + 1 - x.ndim), *x.shape[1:]) if mapped else x
-            for x, own, mapped in _with_axes(program, leaves, is_mapped[0])
-        ]
-        found = _joining(program, what, full)
-        return found, jax.tree.map(lambda _: True, found)
-
-    return joined(list(leaves))
-
-
-def _with_axes(program: Program, leaves: Leaves, mapped: Sequence[bool]) -> Any:
-    return list(zip(leaves, program.own_axes, mapped, strict=True))
 
 
 def _fixed(program: Program, leaves: Leaves) -> Program:

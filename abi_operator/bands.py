@@ -159,10 +159,10 @@ def entry(mapping: Mapping[str, T] | ByBand, name: AnyName) -> T:
     """
     if isinstance(mapping, ByBand):
         return mapping.own
-    names = names_of(name)
-    if len(names) > 1:
-        raise ValueError(f"entries of bands {names} must be of one kind to be one batch.")
-    return mapping[names[0]]
+    first, *others = names_of(name)
+    if others:
+        raise ValueError(f"entries of bands {names_of(name)} must be of one kind to be one batch.")
+    return mapping[first]
 
 
 def by_band(tree: Any, copied: Any, names: Sequence[str]) -> tuple[Any, Any]:

@@ -20,7 +20,11 @@ from .optics import num_terms
 from .solver import sufficient_doublings, toa_brf, toa_radiance
 
 TRACED_TAU = 1000.0
-"""Largest optical depth of a layer in columns that are solved without being read. [-]"""
+"""Largest optical depth of a layer in columns that are solved without being read; of one that is
+opaque any depth will do. [-]"""
+# Single-scattering albedo up to which a layer of that depth lets nothing through: no light comes
+# back from below exp(-69) of its way (diffusion exponent sqrt(3) (1 - ssa) or more).
+_OPAQUE_SSA = 0.96
 # Doublings that are right to 2e-8 for such layers, up to so many streams: against 14 doublings at
 # single-scattering albedos of 0.9 to 1, sun and satellite up to 87 degrees from the zenith.
 _TRACED_DOUBLINGS, _TRACED_STREAMS, _TRACED_MU = 6, 16, 0.05
@@ -199,17 +203,30 @@ def _solved(
     found = {}
     for columns in groups:
         door = toa_radiance if columns.emit else toa_brf
+        arguments: dict[str, Any] = columns.arguments
+        if num_doublings is None:
+            arguments = arguments | {"tau": _without_depth_of_opaque(columns)}
         terms = door(
-            **columns.arguments,
+            **arguments,
             num_streams=options.num_streams,
             num_modes=options.num_modes,
             num_doublings=number,
         )
         if num_doublings is None:
-            thick = jnp.any(columns.arguments["tau"] > TRACED_TAU, axis=-1)
+            thick = jnp.any(arguments["tau"] > TRACED_TAU, axis=-1)
             terms = jnp.where(thick, jnp.nan, terms)
         found |= columns.summed(terms)
     return jnp.stack([found[band] for band in options.bands])
+
+
+def _without_depth_of_opaque(columns: BandColumns) -> Array:
+    """Layers of which light sees the top alone, such as those of strong lines, no deeper than that.
+
+    Not those that shine: the deeper a layer, the less its temperature changes from top to where it
+    is seen.
+    """
+    tau, ssa = columns.arguments["tau"], columns.arguments["ssa"]
+    return tau if columns.emit else jnp.where(ssa <= _OPAQUE_SSA, jnp.minimum(tau, TRACED_TAU), tau)
 
 
 def _traced_doublings(options: Options) -> int:

@@ -4,7 +4,7 @@ How often the solver doubles its layers is a property of the program and chosen 
 layer of all columns. Its optical depth is read before the program is: at the door, in the rules of
 derivatives and in that of `jax.vmap`, all of which know the values that they transform (`_door`).
 Inside `jax.jit` or a loop nobody does, and the program is right for layers up to `TRACED_TAU`:
-columns with a thicker one come back as NaN.
+columns with a thicker one come back as NaN, unless it lets no light through anyway.
 """
 
 from collections.abc import Sequence
@@ -73,6 +73,9 @@ class _Program(NamedTuple):
     def unknown(self) -> "_Program":
         return self
 
+    def own_result(self, leaves: Leaves) -> Any:
+        return jax.ShapeDtypeStruct((len(self.options.bands),), leaves[0].dtype)
+
     def widths(self, leaves: Leaves) -> tuple[int, ...]:
         tile = tile_of_states(leaves, self.structure, self.options)
         return 1, tile, 8 * tile
@@ -102,6 +105,9 @@ class _Depths(NamedTuple):
 
     def unknown(self) -> "_Depths":
         return self
+
+    def own_result(self, leaves: Leaves) -> Any:
+        return jax.ShapeDtypeStruct((), leaves[0].dtype)
 
     def widths(self, leaves: Leaves) -> tuple[int, ...]:
         return _READ_WIDTHS

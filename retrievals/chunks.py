@@ -1,8 +1,9 @@
 """Many pixels, a chunk at a time and on every core."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -39,8 +40,7 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUN
     num_pixels = jax.tree.leaves(arguments)[0].shape[0]
     arguments = jax.tree.map(np.asarray, arguments)
     starts = range(0, num_pixels, chunk)
-    # A setting of this thread, not of the workers.
-    x64 = jax.dtypes.canonicalize_dtype(np.float64) == np.float64
+    x64 = _in_double_precision()
 
     def solve(start: int) -> T:
         with jax.enable_x64(x64):
@@ -52,3 +52,27 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUN
     with ThreadPoolExecutor(usable_cores()) as pool:  # JAX computes without Python's global lock
         others = list(pool.map(solve, starts[1:]))
     return jax.tree.map(lambda *parts: np.concatenate(parts)[:num_pixels], first, *others)
+
+
+@contextmanager
+def meanwhile(function: Callable[[], Any]) -> Iterator[None]:
+    """Run a function on another core beside what the context holds; its result is not wanted.
+
+    What it compiles is there when the context ends: XLA is busy on one core for much of the time
+    that a program takes to compile.
+    """
+    x64 = _in_double_precision()
+
+    def run() -> None:
+        with jax.enable_x64(x64):
+            function()
+
+    with ThreadPoolExecutor(1) as pool:
+        running = pool.submit(run)
+        yield
+        running.result()
+
+
+def _in_double_precision() -> bool:
+    """A setting of this thread, not of others."""
+    return jax.dtypes.canonicalize_dtype(np.float64) == np.float64

@@ -1,7 +1,8 @@
 """Retrieve many pixels: scan, minimise from the best starts, judge."""
 
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -9,7 +10,7 @@ import numpy as np
 
 from abi_operator import State
 
-from .chunks import map_chunks
+from .chunks import CHUNK, map_chunks, meanwhile
 from .first_guess import candidates, guesses, scan
 from .forward import ForwardModel
 from .inverse import DEFAULT_MINIMISER, Inversion, Minimiser, invert
@@ -51,31 +52,45 @@ def retrieve_pixels(
     exact
         See `result_codes`.
     """
-    cost = map_chunks(partial(_scan_chunk, forward), observations, states)
+    starts = np.asarray(guesses(forward))
+    invert_chunk = _in_rounds(forward, minimiser, prior, starts.dtype)
+    with meanwhile(partial(map_chunks, invert_chunk, *_first_chunk(observations, states, starts))):
+        cost = map_chunks(partial(_scan_chunk, forward), observations, states)
     pixel, guess = candidates(cost)
     order = np.lexsort((pixel, guess))  # chunks of similar pixels, which take as many steps
     rows = pixel[order]
-    x_first = np.asarray(guesses(forward))[guess[order]]
     observations, states = jax.tree.map(lambda x: np.asarray(x)[rows], (observations, states))
-    solutions = _minimise(forward, minimiser, prior, observations, states, x_first)
+    solutions = _minimise(invert_chunk, minimiser, observations, states, starts[guess[order]])
     solutions = jax.tree.map(lambda x: x[np.argsort(order)], solutions)
     best, rival = _ranked(solutions, pixel, len(cost))
     codes = result_codes(forward.vector, best, rival, len(forward.bands), exact=exact)
     return Retrieved(best, codes)
 
 
+def _in_rounds(
+    forward: ForwardModel, minimiser: Minimiser, prior: Prior | None, dtype: Any
+) -> Callable[..., Inversion]:
+    """Some steps of a chunk's minimisation; the damping of Levenberg-Marquardt begins anew."""
+    this_round = minimiser._replace(max_steps=min(ROUND_STEPS, minimiser.max_steps))
+    prior = jax.tree.map(lambda x: np.asarray(x, dtype), prior)
+    return partial(_invert_chunk, forward, this_round, prior)
+
+
+def _first_chunk(observations: Observation, states: State, starts: np.ndarray) -> tuple[Any, ...]:
+    """Pixels with which the program that minimises is compiled while another one scans."""
+    some = jax.tree.map(lambda x: np.asarray(x)[:CHUNK], (observations, states))
+    count = len(some[0].sigma)
+    return *some, np.repeat(starts[:1], count, axis=0)
+
+
 def _minimise(
-    forward: ForwardModel,
+    invert_chunk: Callable[..., Inversion],
     minimiser: Minimiser,
-    prior: Prior | None,
     observations: Observation,
     states: State,
     x_first: np.ndarray,
 ) -> Inversion:
-    """Minimise in rounds; the damping of Levenberg-Marquardt begins anew in each."""
-    this_round = minimiser._replace(max_steps=min(ROUND_STEPS, minimiser.max_steps))
-    prior = jax.tree.map(lambda x: np.asarray(x, x_first.dtype), prior)
-    invert_chunk = partial(_invert_chunk, forward, this_round, prior)
+    """Minimise in rounds."""
     solutions = map_chunks(invert_chunk, observations, states, x_first)
     for _ in range(ROUND_STEPS, minimiser.max_steps, ROUND_STEPS):
         rows = np.flatnonzero(~solutions.converged & np.isfinite(solutions.cost))

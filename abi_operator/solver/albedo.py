@@ -7,7 +7,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .column import promoted
 from .door import prepare, solve
-from .program import ground_response, plane_albedo
+from .program import GroundResponse, ground_response, plane_albedo
 from .surface import AnySurface
 
 
@@ -49,7 +49,7 @@ def toa_albedo(
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return solve(plane_albedo, column, options, True)
+    return solve(plane_albedo, column, options, True, by_view=False)
 
 
 class SurfaceCoupling(eqx.Module):
@@ -142,5 +142,7 @@ def surface_coupling(
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    black, coupling, spherical = solve(ground_response, column, options, multiple_views)
+    by_view = GroundResponse._make([True, True, False])  # the spherical albedo has no view
+    found = solve(ground_response, column, options, multiple_views, by_view=by_view)
+    black, coupling, spherical = found
     return SurfaceCoupling(black, coupling, spherical, multiple_views)

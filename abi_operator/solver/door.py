@@ -62,6 +62,7 @@ def solve(
     options: Options,
     multiple_views: bool,
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None = None,
+    by_view: Any = True,
 ) -> Any:
     """Solve columns, with derivatives, `jax.vmap` and threads as they are cheapest.
 
@@ -73,9 +74,11 @@ def solve(
         What to solve.
     gradient
         As in `independent_columns`, of `tile`.
+    by_view
+        Which results of `tile` have an axis of views: a pytree of bools of the same structure.
     """
     leaves, structure = jax.tree.flatten(column)
-    return enter(_Program(tile, gradient, options, multiple_views, structure), leaves)
+    return enter(_Program(tile, gradient, options, multiple_views, structure, by_view), leaves)
 
 
 class _Program(NamedTuple):
@@ -86,6 +89,7 @@ class _Program(NamedTuple):
     options: Options
     multiple_views: bool
     structure: Any
+    by_view: Any
 
     @property
     def own_axes(self) -> tuple[int, ...]:
@@ -103,6 +107,16 @@ class _Program(NamedTuple):
             return self
         number = unknown_doublings(self.options.num_streams)
         return self._replace(options=self.options._replace(num_doublings=number))
+
+    def own_result(self, leaves: Leaves) -> Any:
+        column = jax.tree.unflatten(self.structure, leaves)
+        views = ()
+        if self.multiple_views:
+            views = (max(column.mu.shape[-1], column.relative_azimuth.shape[-1]),)
+        dtype = jnp.result_type(*leaves)
+        return jax.tree.map(
+            lambda has: jax.ShapeDtypeStruct(views if has else (), dtype), self.by_view
+        )
 
     def widths(self, leaves: Leaves) -> tuple[int, ...]:
         tile = tile_size(self.options.num_streams, leaves[0].dtype)

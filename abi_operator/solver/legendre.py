@@ -32,31 +32,40 @@ def associated_legendre(
     mu
         Cosines; NumPy arrays are evaluated by NumPy, in their own precision. [-]
     """
-    xp = np if isinstance(mu, np.ndarray) else jnp
+    in_numpy = isinstance(mu, np.ndarray)
+    xp = np if in_numpy else jnp
     # (1 - mu)(1 + mu) loses no digits near the vertical, 1 - mu^2 half of them.
     square = (1 - mu) * (1 + mu)
     sine = np.sqrt(square) if isinstance(square, np.ndarray) else safe_sqrt(square)
-    diagonal = [xp.ones_like(mu)]
-    for m in range(1, num_modes):
-        diagonal.append(diagonal[-1] * sine * np.sqrt((2 * m - 1) / (2 * m)).item())
-    start = xp.stack(diagonal)
 
-    modes = np.arange(float(num_modes))
+    def step(carry, row):
+        before, here, diagonal = carry
+        is_first, up, down, next_on_diagonal = row
+        here = xp.where(is_first, diagonal, here)
+        following = up * mu * here - down * before
+        return (here, following, diagonal * sine * next_on_diagonal), here
 
-    def by_mode(values: np.ndarray):
-        return xp.asarray(values.reshape(-1, *(1,) * mu.ndim), mu.dtype)
+    degree, mode = np.arange(float(num_degrees))[:, None], np.arange(float(num_modes))
+    below = np.sqrt(np.where(mode <= degree, (degree + 1) ** 2 - mode**2, 1))
+    down = np.sqrt(np.where(mode <= degree, degree**2 - mode**2, 0)) / below
+    ratio = np.sqrt((2 * degree + 1) / (2 * degree + 2))
 
-    degrees = []
-    before, here = xp.zeros_like(start), xp.zeros_like(start)
-    for degree in range(num_degrees):
-        here = xp.where(by_mode(modes) == degree, start, here)
-        degrees.append(here)
-        above = modes <= degree
-        up = np.sqrt(np.where(above, (degree + 1) ** 2 - modes**2, 1))
-        down = np.sqrt(np.where(above, degree**2 - modes**2, 0))
-        following = by_mode((2 * degree + 1) / up) * mu * here - by_mode(down / up) * before
-        before, here = here, following
-    return xp.stack(degrees, axis=1)
+    def rows(x: np.ndarray):
+        return x.reshape(*x.shape, *(1,) * mu.ndim)
+
+    numbers = [rows(x).astype(mu.dtype) for x in ((2 * degree + 1) / below, down, ratio)]
+    all_rows = rows(mode == degree), *numbers
+    nothing = xp.zeros((num_modes, *mu.shape), mu.dtype)
+    carry = nothing, nothing, xp.ones_like(mu[None])
+    if in_numpy:
+        found = []
+        for k in range(num_degrees):
+            carry, here = step(carry, [x[k] for x in all_rows])
+            found.append(here)
+        return np.stack(found, axis=1)
+    # A loop: written out, each degree's functions would be computed anew for those above it.
+    found = jax.lax.scan(step, carry, jax.tree.map(jnp.asarray, all_rows))[1]
+    return jnp.swapaxes(found, 0, 1)
 
 
 def legendre_series(
