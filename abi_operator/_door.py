@@ -7,6 +7,10 @@ a `Program` serve every transformation, its value and its value with slopes, and
 be read both are compiled for a few numbers of columns and no others (`_chunks`). That holds for
 derivatives and `jax.vmap` as well, the rules of which know the values that they transform; under
 `jax.jit` and in loops nobody does, and the program is compiled for the columns that there are.
+
+Traced, a program is one operation with a name and shapes (`_columns`). Only what is left of it when
+all transformations are done is traced inside, once, as it is compiled: `jax.custom_jvp` and
+`jax.custom_batching.custom_vmap` would trace it beforehand for every step of the way.
 """
 
 import math
@@ -84,9 +88,6 @@ def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     return jax.tree.unflatten(jax.tree.structure(_shapes(program, what, leaves)), found)
 
 
-# One operation for all of a program. Traced, it is a name with shapes, and only what is left when
-# all transformations are done is traced inside, once: `jax.custom_jvp` and
-# `jax.custom_batching.custom_vmap` would trace it beforehand for every step of the way.
 _columns = Primitive("columns")
 _columns.multiple_results = True
 

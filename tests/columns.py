@@ -15,6 +15,24 @@ def simple_columns(count=4, num_layers=5, num_moments=33, seed=3):
     return tau, ssa, moments, albedo, mu0, mu, azimuth
 
 
+# What most of the solver's tests share, so that they share its compiled programs.
+STANDARD = {"num_streams": 4, "num_doublings": 4}
+SMALL = {"num_streams": 2, "num_doublings": 1}
+
+
+def standard_columns(count=4):
+    """Columns for the options `STANDARD`, with moments enough for their phase functions."""
+    return simple_columns(count, num_layers=5, num_moments=65)
+
+
+def small_columns(count=3):
+    """Columns for the options `SMALL`: what transforms the solver twice compiles fast.
+
+    One doubling is not exact for them, but as differentiable as many.
+    """
+    return simple_columns(count, num_layers=2, num_moments=5)
+
+
 def hard_columns(num_moments=33, num_streams=8):
     """Columns at every place where a formula might break; 50 layers, padded with empty ones.
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+import plumes
 from disort_suite import (
     FULL_DEGREE,
     Problem,
@@ -17,6 +18,9 @@ from disort_suite import (
 from abi_operator.solver import toa_albedo, toa_radiance
 
 MAX_LAYERS = 6
+# Thicker layers come as several, for which few doublings are enough: a program with more of them
+# takes longer to compile than more layers to solve.
+THICKEST = 25.0
 H_OMEGA = (0.2, 0.5, 0.9, 0.99, 0.999, 1.0)
 H_MU = (0.1, 0.4, 0.7, 1.0)
 # exp(-2 k tau) < 1e-10 for each diffusion exponent k; omega = 1 has its rest in closed form.
@@ -24,6 +28,7 @@ H_TAU = (40.0, 40.0, 40.0, 80.0, 250.0, 40.0)
 MEAN_AZIMUTHS = (18.0, 54.0, 90.0, 126.0, 162.0)
 SEED = 19850314
 NUM_RANDOM, RANDOM_STREAMS = 100, (4, 8, 16)
+PLUME_STREAMS, SHORT_SERIES = (4, 8, 16, 32), (17, 33, 129)
 
 
 @dataclass(frozen=True)
@@ -54,19 +59,29 @@ def half_range_nodes(num_streams):
     return (nodes + 1) / 2, weights / 2
 
 
-def solver_arguments(views, max_layers=MAX_LAYERS):
-    """Arguments of `toa_radiance`, batch first; empty layers below fill up `max_layers`."""
-    problems = [view.problem for view in views]
+def in_parts(problem, levels):
+    """Layers none of which is thick, and the Planck function at their levels."""
+    parts = np.maximum(1, np.ceil(problem.tau / THICKEST)).astype(int)
+    tau, ssa, moments = (
+        np.repeat(x, parts, axis=0) for x in (problem.tau / parts, problem.ssa, problem.moments)
+    )
+    places = np.append(0, np.cumsum(parts))
+    return tau, ssa, moments, np.interp(np.arange(places[-1] + 1), places, levels)
+
+
+def solver_arguments(views):
+    """Arguments of `toa_radiance`, batch first; empty layers below make all as many."""
+    problems, sources = [view.problem for view in views], [view.sources() for view in views]
+    layers = [in_parts(p, levels) for p, (levels, _, _) in zip(problems, sources, strict=True)]
     num_moments = max(p.moments.shape[1] for p in problems)
+    max_layers = max(tau.size for tau, *_ in layers)
     tau, ssa = np.zeros((2, len(views), max_layers))
     moments = np.zeros((len(views), max_layers, num_moments))
     moments[..., 0] = 1
     levels = np.zeros((len(views), max_layers + 1))
-    ground, top = np.zeros((2, len(views)))
-    for i, (view, p) in enumerate(zip(views, problems, strict=True)):
-        n = p.tau.size
-        tau[i, :n], ssa[i, :n], moments[i, :n, : p.moments.shape[1]] = p.tau, p.ssa, p.moments
-        inside, ground[i], top[i] = view.sources()
+    for i, (own_tau, own_ssa, own_moments, inside) in enumerate(layers):
+        n, degrees = own_moments.shape
+        tau[i, :n], ssa[i, :n], moments[i, :n, :degrees] = own_tau, own_ssa, own_moments
         levels[i, : n + 1], levels[i, n + 1 :] = inside, inside[-1]
     albedo, mu0, irradiance = (
         np.array([getattr(p, key) for p in problems])
@@ -77,8 +92,8 @@ def solver_arguments(views, max_layers=MAX_LAYERS):
     sources = {
         "solar_irradiance": irradiance,
         "planck_levels": levels,
-        "surface_emission": ground,
-        "isotropic_top": top,
+        "surface_emission": np.array([ground for _, ground, _ in sources]),
+        "isotropic_top": np.array([top for _, _, top in sources]),
     }
     return (tau, ssa, moments, albedo, mu0, mu, azimuth), sources
 
@@ -120,6 +135,8 @@ def _views(num_streams):
         "suite": [suite(r) for r in suite_rows("disort_radiances.csv", num_streams)],
         "dark": dark,
     }
+    if num_streams in PLUME_STREAMS:
+        views["plumes"] = _seen(plumes.columns())
     if num_streams in RANDOM_STREAMS:
         views["random"] = random_views(num_streams)
     if num_streams in (16, 32, 64):
@@ -136,6 +153,8 @@ def _views(num_streams):
         }
     if num_streams == 16:
         views["isothermal"] = _isothermal()
+        views["delta_m_alone"] = _seen(plumes.delta_m_alone(num_streams))
+        views |= {f"series of {n}": _seen(plumes.with_series(n)) for n in SHORT_SERIES}
     return views
 
 
@@ -144,6 +163,16 @@ def random_views(num_streams):
     """Random warm columns, the odd ones in sunlight too; other ones for each number of streams."""
     rng = np.random.default_rng([SEED, num_streams])
     return [View(*one) for one in random_emitting_problems(rng, NUM_RANDOM, MAX_LAYERS)]
+
+
+def _seen(columns):
+    """Columns of `plumes` under a sun that makes a radiance a reflectance; columns slowest."""
+    directions = list(zip(plumes.MU, 180 - np.degrees(plumes.AZIMUTH), strict=True))
+    return [
+        View(Problem(*column, solar_irradiance=np.pi / column[-1]), mu, azimuth)
+        for column in zip(*columns, strict=True)
+        for mu, azimuth in directions
+    ]
 
 
 def _garcia_siewert():

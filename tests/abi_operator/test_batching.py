@@ -44,7 +44,7 @@ first, second = jax.devices()
 given = [jnp.asarray(x) for x in simple_columns(count=300, num_layers=2, num_moments=3)]
 
 def solve(*arguments):
-    return toa_brf(*arguments, num_streams=2, num_modes=1, num_doublings=3)
+    return toa_brf(*arguments, num_streams=2, num_modes=1, num_doublings=0)
 
 def slopes(*arguments):
     return jax.vmap(jax.grad(solve, argnums=(0, 3)))(*arguments)

@@ -66,7 +66,7 @@ def arguments(size):
     return tau, ssa, moments, 0.1, rng.uniform(0.2, 1, size), 0.6, rng.uniform(0, 3, size)
 
 
-OPTIONS = {"num_streams": 2, "num_doublings": 2}
+OPTIONS = {"num_streams": 2, "num_modes": 1, "num_doublings": 0}
 
 
 def test_another_number_of_columns_is_no_other_program():
@@ -77,30 +77,36 @@ def test_another_number_of_columns_is_no_other_program():
         if event == name:
             compiled.append(event)
 
+    # It stays: older JAX has no function to take one away.
     jax.monitoring.register_event_duration_secs_listener(listen)
     for size in (5, 64, 512):
         toa_brf(*arguments(size), **OPTIONS)
     before = len(compiled)
     for size in (1, 2, 7, 9, 100, 511, 513, 700, 1030, 2000):
         assert toa_brf(*arguments(size), **OPTIONS).shape == (size,)
-    jax.monitoring.unregister_event_duration_listener(listen)
     assert before >= 3 and len(compiled) == before
 
 
-@pytest.mark.parametrize("size", [5, 100, 600])
+def total(weight, *columns):
+    return jnp.sum(weight * toa_brf(*columns, **OPTIONS))
+
+
+PLACES = tuple(range(1, 8))
+MOST = 600
+# One program for any number of columns: those that are not there weigh nothing.
+inside_jit = jax.jit(jax.value_and_grad(total, argnums=PLACES))
+
+
+@pytest.mark.parametrize("size", [5, 100, MOST])
 def test_values_and_slopes_are_those_inside_jit(size):
-    columns = arguments(size)
-
-    def total(*x):
-        return jnp.sum(toa_brf(*x, **OPTIONS))
-
-    places = tuple(range(7))
-    columns = [jnp.asarray(x) for x in columns]
-    outside = jax.value_and_grad(total, argnums=places)(*columns)
-    inside = jax.jit(jax.value_and_grad(total, argnums=places))(*columns)
+    every = [jnp.asarray(x) for x in arguments(MOST)]
+    columns = [x[:size] if x.ndim else x for x in every]
+    outside = jax.value_and_grad(total, argnums=PLACES)(jnp.ones(size), *columns)
+    inside = inside_jit(jnp.asarray(np.arange(MOST) < size, float), *every)
     for ours, theirs in zip(*map(jax.tree.leaves, (outside, inside)), strict=True):
+        own = theirs[:size] if theirs.ndim else theirs
         # Vectors of another width are summed in another order.
-        np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-13)
+        np.testing.assert_allclose(ours, own, rtol=1e-11, atol=1e-13)
 
 
 def test_threads_of_the_caller_get_the_same_numbers():

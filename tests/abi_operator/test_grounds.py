@@ -1,5 +1,7 @@
 """Grounds other than Lambertian in a state, against the solver called by hand."""
 
+from functools import cache
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -14,7 +16,7 @@ from abi_operator.solver import cos_scattering_angle, toa_brf, toa_radiance
 from abi_operator.surface import Lambertian, RossLi, directional_albedo, ocean, surface_emission
 
 SEEN = ("C01", "C02", "C03", "C06")
-OPTIONS = {"num_streams": 4, "num_doublings": 4}
+OPTIONS = {"num_streams": 2, "num_doublings": 4}
 LEVELS = np.linspace(20e3, 0.0, 5)
 
 
@@ -39,18 +41,23 @@ def by_hand(state, band, **emission):
     optics = column_optics(state.atmosphere, BANDS[band])
     angles = geometry.mu0, geometry.mu, geometry.relative_azimuth
     ground = state.albedo[band]
-    arguments = (optics.ssa, optics.moments(5), ground, *angles)
+    arguments = (optics.ssa, optics.moments(3), ground, *angles)
     phase_function = optics.phase_function(cos_scattering_angle(*angles))
     door = toa_radiance if emission else toa_brf
     terms = door(optics.tau, *arguments, phase_function=phase_function, **emission, **OPTIONS)
     return jnp.sum(optics.weight * terms)
 
 
+@cache
+def expected():
+    """Reflectances of the state in the bands that are seen."""
+    return [by_hand(make_state(), band) for band in SEEN]
+
+
 def test_equals_the_solver_called_by_hand():
     state = make_state()
     found = brf(stacked([state, state]), SEEN, **OPTIONS)
-    expected = [by_hand(state, band) for band in SEEN]
-    np.testing.assert_allclose(found, [expected] * 2, rtol=1e-12)
+    np.testing.assert_allclose(found, [expected()] * 2, rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -96,6 +103,4 @@ def test_batches_repeat_what_is_one_number():
     states = [make_state(), make_state()]
     batch = jax.tree.map(lambda *x: jnp.stack([jnp.asarray(y) for y in x]), *states)
     batch = eqx.tree_at(lambda s: s.albedo["C02"].f_geo, batch, jnp.asarray(0.03))
-    together = brf(batch, SEEN, **OPTIONS)
-    alone = brf(make_state(), SEEN, **OPTIONS)
-    np.testing.assert_allclose(together, [alone, alone], rtol=1e-12)
+    np.testing.assert_allclose(brf(batch, SEEN, **OPTIONS), [expected()] * 2, rtol=1e-12)

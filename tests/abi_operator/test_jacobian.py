@@ -94,7 +94,7 @@ def check(state, bands, **options):
         return radiance(state, bands, **options)
 
     forward, reverse = jax.jacfwd(value), jax.jacrev(value)
-    for case in (state, emptied(state)):
+    for case in (emptied(state), state):
         ahead, back = forward(case), reverse(case)
         for (path, a), b in zip(
             jax.tree_util.tree_leaves_with_path(ahead), jax.tree.leaves(back), strict=True
@@ -103,7 +103,7 @@ def check(state, bands, **options):
             assert np.all(np.isfinite(a)), name
             scale = np.max(np.abs(a)) + 1e-300
             np.testing.assert_allclose(a / scale, b / scale, atol=MODES_AGREE, err_msg=name)
-    slopes = jax.tree.leaves(forward(state))
+    slopes = jax.tree.leaves(ahead)
     leaves, structure = jax.tree.flatten(state)
     paths = [jax.tree_util.keystr(p) for p, _ in jax.tree_util.tree_leaves_with_path(state)]
     rng = np.random.default_rng(4)
@@ -129,7 +129,7 @@ def check(state, bands, **options):
 
 
 def test_every_leaf():
-    check(rich_state(), FEW, num_streams=2, num_modes=2, num_doublings=2)
+    check(rich_state(), FEW, num_streams=2, num_modes=2, num_doublings=1)
 
 
 @pytest.mark.slow

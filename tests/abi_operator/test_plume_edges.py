@@ -144,7 +144,7 @@ def seen(air, bands=SIX):
     count = air.height.shape[0]
     grounds = dict.fromkeys(bands, jnp.full(count, 0.15))
     geometry = jax.tree.map(lambda x: jnp.full(count, x), GEOMETRY)
-    return brf(State(air, grounds, geometry), bands, num_streams=2, num_doublings=4)
+    return brf(State(air, grounds, geometry), bands, num_streams=2, num_doublings=2)
 
 
 def with_nothing_above(air, count=4):
@@ -183,7 +183,7 @@ def test_reflectances_hardly_move():
 
 def test_derivatives_in_height():
     """Not 0, equal to differences, and on a level to the difference of a shrinking plume."""
-    air = make_air(26)  # every 792 m above the ground
+    air = make_air(51)  # every 396 m above the ground
 
     @jax.jit
     @jax.vmap
@@ -195,7 +195,7 @@ def test_derivatives_in_height():
     places = np.array([[1130.0, 2890.0], [792.0, 2376.0]])
     slopes = jax.grad(lambda edges: jnp.sum(seen(of_edges(edges), ("C01",))))(places)
     moved = [np.concatenate([x[None], x + step, x + 2 * step]) for x in places]
-    each = np.asarray(seen(of_edges(np.concatenate(moved)), ("C01",))).reshape(len(places), 5)
+    each = np.asarray(seen(of_edges(np.concatenate(moved))))[:, 0].reshape(len(places), 5)
     for edges, found, values in zip(places, slopes, each, strict=True):
         # One-sided, to second order.
         one, two = values[1:3] - values[0], values[3:] - values[0]

@@ -23,7 +23,7 @@ from abi_operator import (
 from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.surface import Lambertian, RossLi
 
-OPTIONS = {"num_streams": 2, "num_doublings": 3}
+OPTIONS = {"num_streams": 2, "num_modes": 1, "num_doublings": 0}
 BANDS = ("C01", "C06")
 
 

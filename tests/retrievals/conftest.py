@@ -6,7 +6,7 @@ import xarray as xr
 
 from abi_operator import smoke
 from abi_operator.nomenclature import SCENARIO
-from abi_operator.scene import column_states, simulate
+from abi_operator.scene import column_states, gases_of, simulate
 from retrievals.forward import ForwardModel, prepared
 from retrievals.observation import observe
 from retrievals.smoke import BANDS
@@ -55,8 +55,8 @@ def scenario(aod_550=(0.05, 0.3, 0.9, 2.0), ssa_shift=0.0):
 
 
 def result(aod_550=(0.05, 0.3, 0.9, 2.0), ssa_shift=0.0):
-    """Result of `scenario`, at 4 streams."""
-    return simulate(scenario(aod_550, ssa_shift), num_streams=4)
+    """Result of `scenario`, at 2 streams."""
+    return simulate(scenario(aod_550, ssa_shift), num_streams=2)
 
 
 @pytest.fixture(scope="session")
@@ -95,6 +95,7 @@ def columns(simulated):
 
 
 @pytest.fixture(scope="session")
-def forward(columns):
-    """Forward model with the settings of the simulation."""
-    return prepared(ForwardModel(StateVector(), BANDS, num_streams=4), columns[1])
+def forward(simulated, columns):
+    """Forward model with the settings of the simulation: that of `retrieve_smoke`."""
+    settings = {"num_streams": simulated.attrs["num_streams"], "gases": gases_of(simulated)}
+    return prepared(ForwardModel(StateVector(), BANDS, **settings), columns[1])

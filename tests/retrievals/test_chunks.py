@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from retrievals.chunks import map_chunks
+from retrievals.chunks import map_chunks, meanwhile
 
 
 @pytest.mark.parametrize("num_pixels", [1, 7, 8, 9, 37])
@@ -24,3 +24,12 @@ def test_workers_keep_the_precision_of_the_caller():
     with jax.enable_x64(False):
         result = map_chunks(jax.jit(lambda x: x * 2), np.arange(40.0), chunk=4)
     assert result.dtype == np.float32
+
+
+def test_what_runs_meanwhile_has_run_and_its_trouble_is_ours():
+    found = []
+    with jax.enable_x64(True), meanwhile(lambda: found.append(jax.numpy.arange(2.0).dtype)):
+        pass
+    assert found == [np.float64]
+    with pytest.raises(ZeroDivisionError), meanwhile(lambda: 1 // 0):
+        pass

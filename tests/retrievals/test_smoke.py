@@ -37,7 +37,7 @@ def test_smoke_is_recovered_over_every_ground(simulated, retrieval):
     assert (codes[CLOUDY] == ResultCode.SUCCESS).sum() >= 2
     assert errors(simulated, retrieval).max() < RECOVERED
     assert (retrieval["cost"] < 1e-6).all() and (retrieval["num_steps"] > 0).all()
-    assert retrieval.attrs["num_streams"] == 4
+    assert retrieval.attrs["num_streams"] == 2
 
 
 def test_single_scattering_albedo_is_recovered_with_it(make_result):

@@ -44,8 +44,7 @@ def run(project, *arguments):
         "PYTHONPATH": os.pathsep.join([str(helpers), *filter(None, PATH)]),
         # States are made in the precision that the tests run in.
         "JAX_ENABLE_X64": "1",
-        # What the first process compiles need not be compiled again.
-        "JAX_COMPILATION_CACHE_DIR": str(project / "compiled"),
+        # What this process compiles need not be compiled again (JAX_COMPILATION_CACHE_DIR is set).
         "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
     }
     return subprocess.run(

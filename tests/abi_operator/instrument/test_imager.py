@@ -91,7 +91,7 @@ def test_air_sun_and_emissivity_move_the_limits_of_a_fire():
             replace(states, fire=Fire(jnp.full(4, share), temperature)) for share in (1.0, 0.0)
         ]
         both = jax.tree.map(lambda *x: jnp.stack(x, axis=1), *cells)
-        return radiance(both, bands, num_streams=2, num_doublings=2)
+        return radiance(both, bands, num_streams=2, num_modes=1, num_doublings=0)
 
     saturated = jax.jit(
         jax.vmap(lambda x, band: observe(x, jnp.array([1.0, 24.0]), band).saturated, (0, None)),

@@ -4,9 +4,9 @@ import functools
 
 import jax
 import jax.numpy as jnp
-import miepython
 import numpy as np
 import pytest
+from independent_mie import sphere_efficiencies
 
 from abi_operator.atmosphere import Atmosphere, LiquidCloud
 from abi_operator.bands import BANDS
@@ -54,16 +54,15 @@ def droplet_mie():
 
     @functools.cache
     def spheres(band):
-        x = np.pi * diameter / BANDS[band].wavelength_um
-        q_ext, q_sca, _, asymmetry = miepython.efficiencies_mx(REFRACTIVE_INDEX[band], x)
-        return q_ext, q_sca, asymmetry
+        wavelength = BANDS[band].wavelength_um
+        return sphere_efficiencies(REFRACTIVE_INDEX[band], diameter / 2, wavelength)
 
     def means(band, effective_radius_um):
-        q_ext, q_sca, asymmetry = spheres(band)
+        q_ext, q_sca, directed = spheres(band)
         slope = 10 / (2 * effective_radius_um)
         area = np.exp(10 * np.log(slope * diameter) - slope * diameter)
         area /= area.sum()
         scattering = area @ q_sca
-        return area @ q_ext, area @ q_ext - scattering, area @ (q_sca * asymmetry) / scattering
+        return area @ q_ext, area @ q_ext - scattering, area @ directed / scattering
 
     return means

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.bands import BANDS
+from abi_operator.bands import BANDS, several_bands
 from abi_operator.optics import aerosol, ash, smoke
 from abi_operator.optics.aerosol import overlap
 from abi_operator.optics.mie_aerosol import mie_optics
@@ -40,21 +40,25 @@ def test_derivative_on_a_level_belongs_to_the_layer_inside(mode):
     np.testing.assert_array_equal(to_top, [0, 1, 0, 0])
 
 
-@pytest.mark.parametrize("band", BANDS)
+def layers_of(atmosphere, name, band):
+    """Optical depth of the layers, ssa and asymmetry of a plume."""
+    optics = aerosol(atmosphere, name, band)
+    return optics.tau[0], optics.ssa[0], optics.moments(3)[:, 1]
+
+
+@pytest.mark.parametrize("num_layers", [10, 27])
 @pytest.mark.parametrize("species", ["smoke", "ash"])
-def test_optical_depth_does_not_depend_on_the_levels(make_atmosphere, band, species):
+def test_optical_depth_does_not_depend_on_the_levels(make_atmosphere, num_layers, species):
     plumes = {
         "smoke": smoke(0.8, brightness=0.7, bands=tuple(BANDS)),
         "ash": ash(0.5, brightness=0.4, bands=tuple(BANDS)),
     }
     plume = plumes[species]
-    expected = plume.aod_550 * plume.relative_extinction[band]
-    for num_layers in (10, 27):
-        optics = aerosol(make_atmosphere(num_layers, plumes=plumes), species, BANDS[band])
-        # Indexed in NumPy: each mask would be compiled by itself.
-        tau, ssa, asymmetry = (
-            np.asarray(x) for x in (optics.tau[0], optics.ssa[0], optics.moments(3)[:, 1])
-        )
+    atmosphere = make_atmosphere(num_layers, plumes=plumes)
+    in_bands = jax.jit(lambda: [layers_of(atmosphere, species, band) for band in BANDS.values()])
+    for band, layers in zip(BANDS, in_bands(), strict=True):
+        tau, ssa, asymmetry = (np.asarray(x) for x in layers)
+        expected = plume.aod_550 * plume.relative_extinction[band]
         np.testing.assert_allclose(tau.sum(), expected, rtol=ROUNDING)
         inside = tau > 0
         np.testing.assert_allclose(ssa[inside], plume.ssa[band], rtol=ROUNDING)
@@ -62,16 +66,21 @@ def test_optical_depth_does_not_depend_on_the_levels(make_atmosphere, band, spec
         np.testing.assert_allclose(asymmetry[inside], plume.asymmetry[band], rtol=ROUNDING)
 
 
-@pytest.mark.parametrize("band", BANDS)
+@pytest.mark.parametrize("num_layers", [10, 27])
 @pytest.mark.parametrize(("species", "radius"), [("smoke", 0.14), ("ash", 2.5), ("dust", 1.2)])
-def test_spheres_fill_their_extent_on_any_levels(make_atmosphere, band, species, radius):
+def test_spheres_fill_their_extent_on_any_levels(make_atmosphere, num_layers, species, radius):
     plume = mie_plume(species, 0.8, radius, base=1130.0, top=5270.0, brightness=0.7)
-    spheres = mie_optics(species, plume.effective_radius_um, band)
-    for num_layers in (10, 27):
-        optics = aerosol(make_atmosphere(num_layers, plumes={"any": plume}), "any", BANDS[band])
-        tau, ssa, asymmetry = (
-            np.asarray(x) for x in (optics.tau[0], optics.ssa[0], optics.moments(3)[:, 1])
-        )
+    atmosphere = make_atmosphere(num_layers, plumes={"any": plume})
+
+    @jax.jit
+    @jax.vmap
+    def in_bands(band):
+        spheres = mie_optics(species, plume.effective_radius_um, band.name)
+        return spheres, layers_of(atmosphere, "any", band)
+
+    found = jax.tree.map(np.asarray, in_bands(several_bands(tuple(BANDS), float)))
+    for k in range(len(BANDS)):
+        spheres, (tau, ssa, asymmetry) = jax.tree.map(lambda x, k=k: x[k], found)
         expected = 0.8 * 0.7 * spheres.relative_extinction
         np.testing.assert_allclose(tau.sum(), expected, rtol=ROUNDING)
         inside = tau > 0
@@ -91,6 +100,11 @@ def by_edges(atmosphere, name, band):
     return jax.jit(tau)
 
 
+def both_modes(function, x):
+    """Jacobian in forward and in reverse mode."""
+    return jax.jit(lambda x: (jax.jacfwd(function)(x), jax.jacrev(function)(x)))(x)
+
+
 PLUMES = {
     "specified": smoke(0.8, base=1130.0, top=3170.0),
     "spheres": mie_plume("ash", 0.8, 3.0, base=1130.0, top=3170.0),
@@ -100,25 +114,27 @@ PLUMES = {
 @pytest.mark.parametrize("name", PLUMES)
 def test_derivative_to_the_edges_against_differences(make_atmosphere, name):
     tau = by_edges(make_atmosphere(plumes={name: PLUMES[name]}), name, "C01")
-    edges, step = jnp.array([1130.0, 3170.0]), 1.0
-    steps = step * jnp.eye(2)
-    differences = jnp.stack([tau(edges + h) - tau(edges - h) for h in steps], axis=1) / (2 * step)
+    edges, step = np.array([1130.0, 3170.0]), 1.0
+    steps = step * np.eye(2)
+    columns = [np.asarray(tau(edges + h)) - np.asarray(tau(edges - h)) for h in steps]
+    differences = np.stack(columns, axis=1) / (2 * step)
     np.testing.assert_array_equal(np.count_nonzero(differences, axis=0), [1, 1])
     # Extinction is linear in the edge: what is left is rounding of depth / step.
-    np.testing.assert_allclose(jax.jacfwd(tau)(edges), differences, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(jax.jacrev(tau)(edges), differences, rtol=1e-9, atol=1e-15)
+    for derivative in both_modes(tau, edges):
+        np.testing.assert_allclose(derivative, differences, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", PLUMES)
 def test_derivative_to_edges_on_levels_is_that_of_a_shrinking_plume(make_atmosphere, name):
     tau = by_edges(make_atmosphere(plumes={name: PLUMES[name]}), name, "C02")
-    edges, step = jnp.array([2000.0, 6000.0]), 1.0  # levels are 2 km apart
+    edges, step = np.array([2000.0, 6000.0]), 1.0  # levels are 2 km apart
     shrinking = [(step, 0.0), (0.0, -step)]
-    differences = [(tau(edges + jnp.array(h)) - tau(edges)) / sum(h) for h in shrinking]
-    expected = jnp.stack(differences, axis=1)
+    on_levels = np.asarray(tau(edges))
+    differences = [(np.asarray(tau(edges + np.array(h))) - on_levels) / sum(h) for h in shrinking]
+    expected = np.stack(differences, axis=1)
     assert np.all(np.any(expected != 0, axis=0))
-    np.testing.assert_allclose(jax.jacfwd(tau)(edges), expected, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(jax.jacrev(tau)(edges), expected, rtol=1e-9, atol=1e-15)
+    for derivative in both_modes(tau, edges):
+        np.testing.assert_allclose(derivative, expected, rtol=1e-9, atol=1e-15)
 
 
 def test_derivative_to_the_effective_radius_against_differences(make_atmosphere):
@@ -134,8 +150,7 @@ def test_derivative_to_the_effective_radius_against_differences(make_atmosphere)
     radius, step = jnp.asarray(3.1), 1e-5
     differences = (optics(radius + step) - optics(radius - step)) / (2 * step)
     assert np.count_nonzero(differences) == 6
-    for mode in (jax.jacfwd, jax.jacrev):
-        derivative = jax.jit(mode(optics))(radius)
+    for derivative in both_modes(optics, radius):
         np.testing.assert_allclose(derivative, differences, rtol=1e-6, atol=1e-12)
 
 

@@ -12,7 +12,14 @@ from abi_operator.optics.water import REFRACTIVE_INDEX
 
 CLOSED_FORM = 1e-10
 FLOAT32 = 2e-6
-RADII = np.array([1.0, 2.5, 4.0, 6.0, 10.0, 20.0, 40.0, 100.0])
+RADII = np.array([1.0, 2.5, 4.0, 6.0, 10.0, 20.0, 30.0, 40.0, 100.0])
+
+
+def efficiencies_of_band(band, nu=NU):
+    """Extinction and absorption of droplets of all `RADII`. [-]"""
+    index = matter(REFRACTIVE_INDEX[band])
+    values = mean_efficiencies(jnp.asarray(RADII), BANDS[band].wavelength_um, index, nu)
+    return [np.asarray(x) for x in values]
 
 
 def sphere_efficiencies(diameter_um, wavelength_um, index):
@@ -43,9 +50,8 @@ def quadrature(effective_radius_um, wavelength_um, index, nu):
 )
 def test_closed_form_against_quadrature(band, nu):
     wavelength, index = BANDS[band].wavelength_um, REFRACTIVE_INDEX[band]
-    values = mean_efficiencies(jnp.asarray(RADII), wavelength, matter(index), nu)
     expected = np.array([quadrature(radius, wavelength, index, nu) for radius in RADII]).T
-    np.testing.assert_allclose(values, expected, rtol=CLOSED_FORM)
+    np.testing.assert_allclose(efficiencies_of_band(band, nu), expected, rtol=CLOSED_FORM)
 
 
 def test_closed_form_of_a_strong_absorber():
@@ -74,20 +80,18 @@ ABSORPTION_ERROR = {"C03": 0.11, "C04": 0.10, "C05": 0.10, "C06": 0.10, "C07": 0
 
 @pytest.mark.parametrize("band", BANDS)
 def test_extinction_against_mie(droplet_mie, band):
+    q_ext, _ = efficiencies_of_band(band)
     for radius, error in EXTINCTION_ERROR[band].items():
-        q_ext, _ = mean_efficiencies(
-            jnp.asarray(radius), BANDS[band].wavelength_um, matter(REFRACTIVE_INDEX[band]), NU
-        )
-        np.testing.assert_allclose(q_ext, droplet_mie(band, radius)[0], rtol=error)
+        value = q_ext[list(RADII).index(radius)]
+        np.testing.assert_allclose(value, droplet_mie(band, radius)[0], rtol=error)
 
 
 @pytest.mark.parametrize("band", ABSORPTION_ERROR)
-@pytest.mark.parametrize("radius", [4.0, 6.0, 10.0, 20.0, 30.0])
-def test_absorption_against_mie(droplet_mie, band, radius):
-    _, q_abs = mean_efficiencies(
-        jnp.asarray(radius), BANDS[band].wavelength_um, matter(REFRACTIVE_INDEX[band]), NU
-    )
-    np.testing.assert_allclose(q_abs, droplet_mie(band, radius)[1], rtol=ABSORPTION_ERROR[band])
+def test_absorption_against_mie(droplet_mie, band):
+    _, q_abs = efficiencies_of_band(band)
+    for radius in (4.0, 6.0, 10.0, 20.0, 30.0):
+        value, expected = q_abs[list(RADII).index(radius)], droplet_mie(band, radius)[1]
+        np.testing.assert_allclose(value, expected, rtol=ABSORPTION_ERROR[band])
 
 
 @pytest.mark.float32

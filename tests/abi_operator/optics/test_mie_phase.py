@@ -6,7 +6,7 @@ import mie_reference
 import numpy as np
 import pytest
 
-from abi_operator.bands import BANDS
+from abi_operator.bands import BANDS, several_bands
 from abi_operator.optics import MiePhase, mie_species
 from abi_operator.optics.mie_aerosol import mie_optics
 from abi_operator.optics.mie_table import DROPLETS, mie_table
@@ -42,12 +42,12 @@ def test_tables_against_miepython(material):
 
     @jax.jit
     def all_bands(radii):
-        rows = []
-        for band in BANDS:
-            phase = MiePhase(radii, material, band)
-            optics = mie_optics(material, radii, band)
-            rows.append((*optics, phase.moments(17), jax.vmap(phase)(cosines).T))
-        return [jnp.stack(x, axis=1) for x in zip(*rows, strict=True)]
+        def in_band(band):
+            phase = MiePhase(radii, material, band.name)
+            optics = mie_optics(material, radii, band.name)
+            return *optics, phase.moments(17), jax.vmap(phase)(cosines).T
+
+        return jax.vmap(in_band, out_axes=1)(several_bands(tuple(BANDS), float))
 
     extinction, coalbedo, asymmetry, moments, phase = all_bands(
         jnp.asarray(reference.effective_radius_um)
@@ -84,10 +84,14 @@ def test_phase_function_agrees_with_its_moments(material):
 
     @jax.jit
     def functions(radii, cosines):
-        phases = [MiePhase(radii, material, band) for band in bands]
-        return [(jax.vmap(phase)(cosines), phase.moments(65)) for phase in phases]
+        def in_band(band):
+            phase = MiePhase(radii, material, band.name)
+            return jax.vmap(phase)(cosines), phase.moments(65)
 
-    for phase, moments in functions(jnp.asarray(between), jnp.asarray(np.cos(angle))):
+        return jax.vmap(in_band)(several_bands(bands, float))
+
+    found = functions(jnp.asarray(between), jnp.asarray(np.cos(angle)))
+    for phase, moments in zip(*found, strict=True):
         assert np.all(phase > 0)
         integrals = (measure * np.asarray(phase).T) @ legendre
         np.testing.assert_allclose(integrals[1:-1], moments[1:-1], rtol=0, atol=CONSISTENT)

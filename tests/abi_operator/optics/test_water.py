@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.bands import BANDS
+from abi_operator.bands import BANDS, several_bands
 from abi_operator.optics.water import (
     ASYMMETRY,
     EFFECTIVE_RADIUS_UM,
@@ -30,30 +30,38 @@ def test_refractive_index_is_segelsteins(band):
     np.testing.assert_allclose(-index.imag, np.exp(log_k), rtol=2.5e-3)
 
 
-@pytest.mark.parametrize("band", BANDS)
-def test_asymmetry_against_mie(droplet_mie, band):
+def in_every_band(function, radii):
+    """A function of radius and name of the band, (band, radius)."""
+    of_band = jax.vmap(function, in_axes=(0, None))
+    mapped = jax.jit(lambda bands, radii: jax.vmap(of_band, in_axes=(None, 0))(radii, bands))
+    bands = several_bands(tuple(BANDS), float).name
+    return np.asarray(mapped(bands, jnp.asarray(radii, float)))
+
+
+def test_asymmetry_against_mie(droplet_mie):
     radii = [2.5, 2.7, 3.2, 4.0, 4.25, 5.5, 7.5, 10.0, 13.5, 25.0, 35.0, 40.0]
-    expected = [droplet_mie(band, radius)[2] for radius in radii]
-    value = droplet_asymmetry(jnp.asarray(radii), band)
-    np.testing.assert_allclose(value, expected, rtol=0, atol=MIE)
+    expected = [[droplet_mie(band, radius)[2] for radius in radii] for band in BANDS]
+    values = in_every_band(droplet_asymmetry, radii)
+    np.testing.assert_allclose(values, expected, rtol=0, atol=MIE)
 
 
-@pytest.mark.parametrize("band", BANDS)
-def test_asymmetry_passes_through_the_table_and_is_constant_beyond(band):
-    radii = np.array([0.5, *EFFECTIVE_RADIUS_UM, 200.0])
-    table = ASYMMETRY[band]
-    expected = [table[0], *table, table[-1]]
-    np.testing.assert_allclose(droplet_asymmetry(jnp.asarray(radii), band), expected, rtol=1e-14)
+def test_asymmetry_passes_through_the_table_and_is_constant_beyond():
+    values = in_every_band(droplet_asymmetry, [0.5, *EFFECTIVE_RADIUS_UM, 200.0])
+    for band, value in zip(BANDS, values, strict=True):
+        table = ASYMMETRY[band]
+        np.testing.assert_allclose(value, [table[0], *table, table[-1]], rtol=1e-14)
+        alone = droplet_asymmetry(jnp.asarray(EFFECTIVE_RADIUS_UM, float), band)
+        np.testing.assert_allclose(alone, table, rtol=1e-14)
 
 
-@pytest.mark.parametrize("band", BANDS)
-def test_slope_is_continuous_and_zero_at_the_ends(band):
-    slope = jax.jit(jax.vmap(jax.grad(lambda radius: droplet_asymmetry(radius, band))))
+def test_slope_is_continuous_and_zero_at_the_ends():
     nodes, nearby = np.asarray(EFFECTIVE_RADIUS_UM, float), 1e-9
-    below, above = slope(nodes * (1 - nearby)), slope(nodes * (1 + nearby))
+    radii = np.concatenate([nodes * (1 - nearby), nodes * (1 + nearby), [1.0, *ENDS, 100.0]])
+    slope = in_every_band(jax.grad(droplet_asymmetry), radii)
+    below, above, ends = np.split(slope, [len(nodes), 2 * len(nodes)], axis=1)
     # The second derivative times the distance between the two points is what may differ.
     np.testing.assert_allclose(below, above, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(slope(np.array([1.0, *ENDS, 100.0])), 0, atol=1e-15)
+    np.testing.assert_allclose(ends, 0, atol=1e-15)
 
 
 @pytest.mark.float32

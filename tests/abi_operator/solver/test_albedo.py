@@ -4,18 +4,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from columns import simple_columns
+from columns import SMALL, STANDARD, simple_columns, small_columns, standard_columns
 
 from abi_operator.solver import double_gauss, surface_coupling, toa_albedo, toa_brf
 
-OPTIONS = {"num_streams": 4, "num_doublings": 4}
 CLOSED_FORM = 1e-12  # the same solve, summed in another order
 
 
 @pytest.mark.parametrize("scattering", ["tms", pytest.param(None, marks=pytest.mark.slow)])
 def test_the_closed_form_is_the_solver_for_every_albedo(scattering):
-    tau, ssa, moments, albedo, *angles = simple_columns()
-    options = OPTIONS | {"single_scattering": scattering}
+    tau, ssa, moments, albedo, *angles = standard_columns()
+    options = STANDARD | {"num_streams": 2, "single_scattering": scattering}
     coupling = surface_coupling(tau, ssa, moments, *angles, **options)
     for a in (np.zeros(4), np.full(4, 0.3), np.ones(4), albedo):
         expected = toa_brf(tau, ssa, moments, a, *angles, **options)
@@ -25,10 +24,10 @@ def test_the_closed_form_is_the_solver_for_every_albedo(scattering):
 
 
 def test_the_closed_form_for_several_views_and_under_a_slanting_sun():
-    tau, ssa, moments, albedo, mu0, mu, azimuth = simple_columns()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = standard_columns()
     views = np.stack([mu, mu0], axis=1), np.stack([azimuth, 0 * azimuth], axis=1)
     secant = 0.9 / mu0[:, None] * np.ones_like(tau)
-    options = OPTIONS | {"multiple_views": True, "secant": secant}
+    options = STANDARD | {"multiple_views": True, "secant": secant}
     coupling = surface_coupling(tau, ssa, moments, mu0, *views, **options)
     expected = toa_brf(tau, ssa, moments, albedo, mu0, *views, **options)
     np.testing.assert_allclose(coupling.brf(albedo), expected, rtol=CLOSED_FORM)
@@ -39,14 +38,15 @@ def test_the_closed_form_for_several_views_and_under_a_slanting_sun():
 
 def test_plane_albedo_is_the_mean_reflectance():
     r""":math:`2\sum_i w_i\mu_i BRF_0(\mu_i)` over the streams, mode 0, without the correction."""
-    tau, ssa, moments, albedo, mu0, *_ = simple_columns()
+    tau, ssa, moments, albedo, mu0, *_ = (x[:, None, None] for x in standard_columns())
     mu, weight = double_gauss(4)
-    views = np.broadcast_to(mu, (4, 2))
-    mean = toa_brf(
-        tau, ssa, moments, albedo, mu0, views, 0 * views, num_modes=1, single_scattering=None,
-        multiple_views=True, **OPTIONS,
-    )  # fmt: skip
-    plane = toa_albedo(tau, ssa, moments, albedo, mu0, **OPTIONS)
+    # The mean over so many azimuths is the mode of order 0.
+    azimuths = 2 * np.pi * np.arange(4) / 4
+    every = toa_brf(
+        tau, ssa, moments, albedo, mu0, mu[:, None], azimuths, single_scattering=None, **STANDARD
+    )
+    plane = toa_albedo(*standard_columns()[:5], **STANDARD)
+    mean = np.mean(every, axis=-1)
     np.testing.assert_allclose(plane, 2 * np.sum(weight * mu * mean, axis=1), rtol=CLOSED_FORM)
 
 
@@ -71,39 +71,45 @@ def test_nothing_is_lost_in_white_air_over_white_ground(num_streams):
 
 def test_conservative_air_sends_light_up_or_down():
     """With ssa = 1 the spherical albedo from below and the mean transmission add up to 1."""
-    tau, ssa, moments, _, mu0, mu, azimuth = simple_columns()
+    tau, ssa, moments, _, mu0, mu, azimuth = standard_columns()
     white = np.ones_like(ssa)
     nodes, weight = double_gauss(4)
     shape = (4, nodes.size)
     views = np.broadcast_to(nodes, shape)
-    options = OPTIONS | {"multiple_views": True, "secant": 1 / mu0[:, None] * np.ones_like(tau)}
+    options = STANDARD | {"multiple_views": True, "secant": 1 / mu0[:, None] * np.ones_like(tau)}
     coupling = surface_coupling(tau, white, moments, mu0, views, np.zeros(shape), **options)
-    plane = toa_albedo(tau, white, moments, np.zeros(4), mu0, **OPTIONS)
+    plane = toa_albedo(tau, white, moments, np.zeros(4), mu0, **STANDARD)
     # coupling = T(mu0) T(mu); black ground swallows T(mu0) of the sunlight.
     upward = 2 * np.sum(weight * nodes * coupling.coupling, axis=1) / (1 - plane)
     np.testing.assert_allclose(upward, 1 - coupling.spherical_albedo, rtol=1e-11)
 
 
 def test_derivatives_of_the_closed_form():
-    tau, ssa, moments, albedo, *angles = (jnp.asarray(x) for x in simple_columns())
-    options = OPTIONS | {"num_streams": 2}
+    tau, ssa, moments, albedo, *angles = (jnp.asarray(x) for x in small_columns())
+    places = tuple(range(7))
 
-    def by_coupling(tau, albedo):
-        return jnp.sum(surface_coupling(tau, ssa, moments, *angles, **options).brf(albedo))
+    def by_coupling(tau, ssa, moments, albedo, *angles):
+        return jnp.sum(surface_coupling(tau, ssa, moments, *angles, **SMALL).brf(albedo))
 
-    def directly(tau, albedo):
-        return jnp.sum(toa_brf(tau, ssa, moments, albedo, *angles, **options))
+    def directly(*arguments):
+        return jnp.sum(toa_brf(*arguments, **SMALL))
 
     for found, expected in zip(
-        jax.grad(by_coupling, argnums=(0, 1))(tau, albedo),
-        jax.grad(directly, argnums=(0, 1))(tau, albedo),
+        jax.grad(by_coupling, argnums=places)(tau, ssa, moments, albedo, *angles),
+        jax.grad(directly, argnums=places)(tau, ssa, moments, albedo, *angles),
         strict=True,
     ):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-13)
-    slope = jax.grad(lambda t: jnp.sum(toa_albedo(t, ssa, moments, albedo, angles[0], **options)))
+
+
+def test_derivative_of_the_plane_albedo():
+    tau, ssa, moments, albedo, mu0, *_ = (jnp.asarray(x) for x in small_columns())
+
+    def plane(tau):
+        return toa_albedo(tau, ssa, moments, albedo, mu0, **SMALL)
+
+    slope = jax.grad(lambda tau: jnp.sum(plane(tau)))(tau)
     step = np.zeros_like(tau)
     step[:, 1] = 1e-5
-    difference = [
-        toa_albedo(tau + s * step, ssa, moments, albedo, angles[0], **options) for s in (1, -1)
-    ]
-    np.testing.assert_allclose(slope(tau)[:, 1], (difference[0] - difference[1]) / 2e-5, rtol=1e-6)
+    difference = (plane(tau + step) - plane(tau - step)) / 2e-5
+    np.testing.assert_allclose(slope[:, 1], difference, rtol=1e-6)

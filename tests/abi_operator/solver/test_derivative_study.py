@@ -80,7 +80,9 @@ def probes(rng, columns, gradients):
         mask = exists if gradient.ndim == 2 else exists[..., None]
         yield k, rng.choice([-1.0, 1.0], gradient.shape) * mask
         flat = np.abs(gradient * mask).reshape(len(gradient), -1)
-        yield k, np.eye(flat.shape[1])[flat.argmax(axis=1)].reshape(gradient.shape)
+        largest = np.zeros(flat.shape)
+        largest[np.arange(len(flat)), flat.argmax(axis=1)] = 1
+        yield k, largest.reshape(gradient.shape)
 
 
 def study(rng, columns, num_streams, single_scattering):
@@ -168,7 +170,7 @@ def assert_study(seeds, count, num_streams, single_scattering):
 
 
 def test_derivatives_of_random_columns():
-    assert_study([SEED], 12, 4, "tms")
+    assert_study([SEED], 8, 4, "tms")
 
 
 @pytest.mark.slow
@@ -197,7 +199,7 @@ def at_angles(num_streams, single_scattering):
             jnp.cos(view) + mu_more,
             azimuth,
             num_streams=num_streams,
-            num_doublings=5,
+            num_doublings=4,
             single_scattering=single_scattering,
         )
 
@@ -255,7 +257,11 @@ def check_cosine_of_one(brf, sun, view, which):
 
 @pytest.mark.parametrize(
     ("num_streams", "single_scattering"),
-    [pytest.param(2, None, marks=pytest.mark.slow), (4, "tms")],
+    [
+        (2, "tms"),
+        pytest.param(2, None, marks=pytest.mark.slow),
+        pytest.param(4, "tms", marks=pytest.mark.slow),
+    ],
 )
 def test_derivatives_at_the_vertical(num_streams, single_scattering):
     """In the zenith angle they are right at every angle above 0 and tend to the slope across the

@@ -3,12 +3,13 @@
 That they are right is in `test_derivative_study`.
 """
 
+import columns
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 import pytest
-from columns import hard_columns, simple_columns
+from columns import SMALL, hard_columns
 
 from abi_operator.solver import toa_brf
 
@@ -28,12 +29,12 @@ def solver(num_streams=8, num_doublings=5, **options):
 
 
 def small_columns(count=3):
-    """Two layers at two streams: programs that transform the solver twice compile fast."""
-    columns = simple_columns(count=count, num_layers=2, num_moments=5)
-    return [jnp.asarray(x) for x in columns], solver(num_streams=2, num_doublings=3)
+    return [jnp.asarray(x) for x in columns.small_columns(count)], solver(**SMALL)
 
 
-@pytest.mark.parametrize("num_streams", [4, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "num_streams", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (4, 8))]
+)
 def test_finite_and_equal_in_both_modes_at_every_hard_place(num_streams):
     names, arguments = hard_columns(num_streams=num_streams)
     arguments = [jnp.asarray(x) for x in arguments]
@@ -86,8 +87,8 @@ def test_vmap_compiled_is_the_batch():
 )
 def test_second_derivatives(order):
     """Hessian times a direction, in all inputs, against differences of the gradient."""
-    columns, function = small_columns(count=1)
-    arguments = tuple(x[0] for x in columns)
+    batch, function = small_columns(count=1)
+    arguments = tuple(x[0] for x in batch)
     rng = np.random.default_rng(2)
     direction = tuple(jnp.asarray(rng.normal(size=x.shape)) for x in arguments)
     gradient = jax.grad(function, argnums=ALL)

@@ -163,7 +163,9 @@ def test_inverse_of_positive_definite_matrices(n):
     np.testing.assert_allclose(product, identity, atol=1e-12)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 6, 8, 12])
+@pytest.mark.parametrize(
+    "n", [1, 2, 3, 12, *(pytest.param(n, marks=pytest.mark.slow) for n in (6, 8))]
+)
 def test_quotients_of_positive_definite_matrices(n):
     """By halves of halves, and their derivative, which is written out, against differences."""
     rng = np.random.default_rng(n)
@@ -225,7 +227,7 @@ def test_more_doublings_for_thicker_layers_and_lower_sun():
         assert sufficient_doublings(1e5, 1e-3, num_streams) <= 14
 
 
-@pytest.mark.parametrize("doublings", range(7))
+@pytest.mark.parametrize("doublings", [0, 1, 2, 3, 4, 6, pytest.param(5, marks=pytest.mark.slow)])
 def test_half_layer_is_tanh_up_to_the_reach_of_its_doublings(doublings):
     """One node with a = b = 1: admittance tanh(h), impedance h coth(h), h = tau / 2."""
     reach = _REACH[doublings] if doublings < 5 else _REACH[4] * 4 ** (doublings - 4)

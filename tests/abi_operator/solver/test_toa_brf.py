@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from cdisort import cdisort_brf
-from columns import simple_columns
+from columns import STANDARD, simple_columns, standard_columns
 
 from abi_operator.solver import toa_brf
 
@@ -17,31 +17,28 @@ ROUNDING = 1e-12
 SPLIT = 1e-10
 
 
-def hazy(count=4, num_moments=65, **options):
-    """The columns of nearly all tests here, which so share one program."""
-    return simple_columns(count=count, num_moments=num_moments, **options)
+# Columns that make a chunk of the second width, of which a program is compiled anyway.
+MANY = 16
 
 
-def brf(columns, num_streams=4, num_doublings=4, **options):
-    return np.asarray(
-        toa_brf(*columns, num_streams=num_streams, num_doublings=num_doublings, **options)
-    )
+def brf(columns, **options):
+    return np.asarray(toa_brf(*columns, **(STANDARD | options)))
 
 
 def test_without_atmosphere_it_is_the_albedo():
-    tau, *rest = hazy()
+    tau, *rest = standard_columns()
     np.testing.assert_allclose(brf((0 * tau, *rest)), rest[2], rtol=ROUNDING)
 
 
 def test_without_scattering_the_ground_shines_through_both_paths():
-    tau, ssa, moments, albedo, mu0, mu, azimuth = hazy()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = standard_columns()
     expected = albedo * np.exp(-tau.sum(axis=1) * (1 / mu0 + 1 / mu))
     result = brf((tau, 0 * ssa, moments, albedo, mu0, mu, azimuth))
     np.testing.assert_allclose(result, expected, rtol=1e-9)
 
 
 def test_thin_layer_scatters_once_exactly():
-    tau, ssa, _, albedo, mu0, mu, azimuth = hazy()
+    tau, ssa, _, albedo, mu0, mu, azimuth = standard_columns()
     g, thin = 0.7, 1e-8 * tau
     moments = np.broadcast_to(g ** np.arange(65), (*tau.shape, 65))
     angle = -mu * mu0 - np.sqrt((1 - mu**2) * (1 - mu0**2)) * np.cos(azimuth)
@@ -56,39 +53,44 @@ def test_thin_layer_scatters_once_exactly():
 def test_nothing_is_lost_between_white_ground_and_white_air(num_streams):
     """With ssa = 1 over albedo 1 the mean of the BRF over all views, weighted by mu, is 1."""
     nodes, weights = np.polynomial.legendre.leggauss(num_streams // 2)
-    mu, weight = (nodes + 1) / 2, weights / 2
-    layers = 4
-    shape = (mu.size, layers)
-    tau = np.broadcast_to([0.1, 3.0, 200.0, 0.5], shape)
-    moments = np.broadcast_to(0.85 ** np.arange(17), (*shape, 17))
+    # The mean over so many azimuths is the mode of order 0.
+    azimuths = np.pi * np.arange(2 * num_streams) / num_streams
+    mu, azimuth = (x.ravel() for x in np.meshgrid((nodes + 1) / 2, azimuths, indexing="ij"))
+    tau = np.tile([0.1, 3.0, 65, 65, 70], (mu.size, 1))
+    moments = np.broadcast_to(0.85 ** np.arange(65), (*tau.shape, 65))
     one = np.ones(mu.size)
-    mode0 = toa_brf(
-        tau, np.ones(shape), moments, one, 0.6 * one, mu, 0 * one,
-        num_streams=num_streams, num_modes=1, single_scattering=None,
+    columns = tau, np.ones(tau.shape), moments, one, 0.6 * one, mu, azimuth
+    result = brf(
+        columns, num_streams=num_streams, num_doublings=None, single_scattering=None
     )  # fmt: skip
-    np.testing.assert_allclose(2 * np.sum(weight * mu * mode0), 1, rtol=1e-11)
+    mean = np.mean(result.reshape(nodes.size, -1), axis=1)
+    np.testing.assert_allclose(np.sum(weights * (nodes + 1) / 2 * mean), 1, rtol=1e-11)
 
 
 def test_swapping_sun_and_satellite_changes_nothing():
-    tau, ssa, moments, albedo, mu0, mu, azimuth = hazy()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = standard_columns()
     there = brf((tau, ssa, moments, albedo, mu0, mu, azimuth))
     back = brf((tau, ssa, moments, albedo, mu, mu0, azimuth))
     np.testing.assert_allclose(there, back, rtol=1e-11)
 
 
 def test_split_layers_and_empty_layers_change_nothing():
-    columns = hazy()
-    whole = brf(columns)
-    tau, ssa, moments, *rest = columns
-    halves = [np.repeat(x, 2, axis=1) for x in (0.5 * tau, ssa, moments)]
-    np.testing.assert_allclose(brf((*halves, *rest)), whole, rtol=SPLIT)
-    empty = [np.insert(x, [0, 2, 2, 5, 5], 0.0, axis=1) for x in (tau, ssa, moments)]
-    np.testing.assert_allclose(brf((*empty, *rest)), whole, rtol=1e-13)
+    tau, ssa, moments, *rest = standard_columns()
+
+    def with_layers(*, chosen, share):
+        layers = tau[:, chosen] * np.array(share), ssa[:, chosen], moments[:, chosen]
+        return brf((*layers, *rest))
+
+    whole = with_layers(chosen=[0, 1, 2, 2, 2], share=[1, 1, 0, 0, 0])
+    halves = with_layers(chosen=[0, 0, 1, 1, 2], share=[0.5, 0.5, 0.5, 0.5, 0])
+    np.testing.assert_allclose(halves, whole, rtol=SPLIT)
+    apart = with_layers(chosen=[2, 0, 3, 1, 4], share=[0, 1, 0, 1, 0])
+    np.testing.assert_allclose(apart, whole, rtol=1e-13)
 
 
 @pytest.mark.parametrize("count", [1, 7, 300])
 def test_batch_order_subset_and_tiles_change_nothing(count):
-    columns = hazy(count)
+    columns = standard_columns(count)
     order = np.random.default_rng(0).permutation(count)
     whole = brf(columns)
     np.testing.assert_allclose(brf([x[order] for x in columns]), whole[order], rtol=1e-13)
@@ -97,7 +99,7 @@ def test_batch_order_subset_and_tiles_change_nothing(count):
 
 
 def test_leading_axes_broadcast():
-    tau, ssa, moments, albedo, mu0, mu, azimuth = hazy()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = standard_columns()
     albedos = np.array([0.0, 0.1, 0.5])[:, None]
     grid = brf((tau, ssa, moments, albedos, mu0, mu, azimuth))
     assert grid.shape == (3, 4)
@@ -106,32 +108,32 @@ def test_leading_axes_broadcast():
 
 
 def test_doublings_chosen_from_the_data_equal_more_of_them():
-    columns = hazy()
-    chosen = brf(columns, num_doublings=None)
-    np.testing.assert_allclose(chosen, brf(columns, num_doublings=8), rtol=1e-10)
-    traced = jax.jit(lambda *a: toa_brf(*a, num_streams=4))(*columns)
+    """More are chosen for thick neighbours, and where the data are traced."""
+    columns = standard_columns()
+    options = {"num_streams": 2, "num_doublings": None}
+    chosen = brf(columns, **options)
+    traced = jax.jit(lambda *a: toa_brf(*a, num_streams=2))(*columns)
     np.testing.assert_allclose(chosen, traced, rtol=1e-10)
+    columns[0][2:] = 1e4
+    np.testing.assert_allclose(brf(columns, **options)[:2], chosen[:2], rtol=SPLIT)
 
 
 def test_lists_are_arrays():
-    columns = hazy()
+    columns = standard_columns()
     listed = [x.tolist() for x in columns]
     np.testing.assert_array_equal(brf(listed), brf(columns))
 
 
-def test_thick_neighbours_change_nothing_through_the_doublings():
-    columns = hazy()
-    alone = brf([x[:1] for x in columns], num_doublings=None)
-    columns[0][1:] = 1e4
-    np.testing.assert_allclose(brf(columns, num_doublings=None)[:1], alone, rtol=SPLIT)
-
-
 def test_grazing_reflectances_below_zero_are_reported():
     """Four streams, no correction, sun and view 87 degrees from the vertical: -0.6, as CDISORT."""
-    column = np.full(1, 0.2), np.full(1, 0.9), 0.85 ** np.arange(9.0)[None], 0.0, 0.05, 0.05, 0.0
-    result = float(brf(column, num_streams=4, single_scattering=None))
-    assert result < -0.5
-    np.testing.assert_allclose(result, cdisort_brf(*column, 4, False), rtol=1e-8)
+    layer = np.full(1, 0.2), np.full(1, 0.9), 0.85 ** np.arange(65.0)[None]
+    padded = [np.pad(x, [(0, 4)] + [(0, 0)] * (x.ndim - 1)) for x in layer]
+    azimuths = np.linspace(0, np.pi, MANY)
+    columns = [np.tile(x, (MANY,) + (1,) * np.ndim(x)) for x in (*padded, 0.0, 0.05, 0.05)]
+    result = brf((*columns, azimuths), single_scattering=None)
+    assert result[0] < -0.5
+    expected = [cdisort_brf(*layer, 0.0, 0.05, 0.05, azimuth, 4, False) for azimuth in azimuths]
+    np.testing.assert_allclose(result, expected, rtol=1e-8)
 
 
 @pytest.mark.slow
@@ -154,11 +156,11 @@ def test_backscatter_is_where_relative_azimuth_is_zero():
 
 
 def test_exact_phase_function_equals_a_long_enough_series():
-    tau, ssa, _, albedo, mu0, mu, azimuth = hazy()
+    tau, ssa, _, albedo, mu0, mu, azimuth = standard_columns(MANY)
     g = 0.6
     angle = -mu * mu0 - np.sqrt((1 - mu**2) * (1 - mu0**2)) * np.cos(azimuth)
     phase = np.repeat(((1 - g**2) / (1 + g**2 - 2 * g * angle) ** 1.5)[:, None], 5, axis=1)
-    long = np.broadcast_to(g ** np.arange(65), (4, 5, 65))
+    long = np.broadcast_to(g ** np.arange(65), (MANY, 5, 65))
     summed = brf((tau, ssa, long, albedo, mu0, mu, azimuth))
     given = brf((tau, ssa, long[..., :5], albedo, mu0, mu, azimuth), phase_function=phase)
     np.testing.assert_allclose(summed, given, rtol=1e-11)
@@ -169,9 +171,9 @@ def test_exact_phase_function_equals_a_long_enough_series():
 )
 def test_few_modes_leave_the_exact_single_scattering_alone(num_streams, fewer):
     """A thin layer scatters once, so that one mode is as good as all; a thick one needs more."""
-    tau, *rest = hazy()
+    tau, *rest = standard_columns()
+    rest[2] = np.zeros((MANY // 4, 1))  # black ground, and as many columns as others have
     thin, thick = (1e-9 * tau, *rest), (tau, *rest)
-    rest[2][:] = 0  # black ground
     options = {"num_streams": num_streams}
     np.testing.assert_allclose(brf(thin, num_modes=1, **options), brf(thin, **options), rtol=1e-6)
     whole = brf(thick, **options)
@@ -180,7 +182,7 @@ def test_few_modes_leave_the_exact_single_scattering_alone(num_streams, fewer):
 
 
 def test_moment_zero_is_one_whatever_is_given():
-    tau, ssa, moments, *rest = hazy()
+    tau, ssa, moments, *rest = standard_columns()
     other = moments.copy()
     other[..., 0] = 7
     np.testing.assert_array_equal(brf((tau, ssa, other, *rest)), brf((tau, ssa, moments, *rest)))
@@ -198,18 +200,20 @@ def test_float32_in_float32_out_and_near_float64():
 
 
 def test_float32_never_computes_in_float64():
-    columns = [jnp.asarray(x, jnp.float32) for x in hazy()]
-    jaxpr = jax.make_jaxpr(lambda *a: toa_brf(*a, num_streams=4))(*columns)
-    assert "f64" not in str(jaxpr)
+    columns = [jnp.asarray(x, jnp.float32) for x in standard_columns()]
+    program = jax.jit(lambda *a: toa_brf(*a, num_streams=4, num_doublings=1)).lower(*columns)
+    assert "f64" not in program.as_text()
 
 
 def test_other_float_types_are_promoted_together():
-    columns = hazy()
+    columns = standard_columns()
     mixed = [np.asarray(columns[0], np.float32), *columns[1:]]
     assert brf(mixed).dtype == jnp.result_type(float)
-    single = [np.asarray(x, np.float32) for x in columns]
-    single[3] = 0.1  # a Python number follows the arrays
-    assert brf(single).dtype == jnp.float32
+    layers, others = columns[:3], columns[4:]
+    single = [np.asarray(x, np.float32) for x in (*layers, *others)]
+    # A Python number follows the arrays.
+    found = jax.eval_shape(lambda *x: toa_brf(*x[:3], 0.1, *x[3:], **STANDARD), *single)
+    assert found.dtype == jnp.float32
 
 
 @pytest.mark.parametrize(
@@ -228,7 +232,7 @@ def test_bad_options_are_refused(change, message):
 
 
 def test_bad_shapes_are_refused():
-    tau, ssa, moments, *rest = hazy()
+    tau, ssa, moments, *rest = standard_columns()
     with pytest.raises(ValueError, match="same number of layers"):
         toa_brf(tau[:, :3], ssa, moments, *rest)
     with pytest.raises(ValueError, match="do not broadcast"):

@@ -1,0 +1,29 @@
+"""Layers far deeper than light sees, where nobody can read how deep they are."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from abi_operator import Geometry, State, brf, standard_atmosphere
+from abi_operator.band_columns import columns_of_bands
+from abi_operator.bands_of_states import TRACED_TAU
+from abi_operator.optics import ALL_GASES
+
+BANDS = ("C04",)
+OPTIONS = {"num_streams": 2, "num_modes": 1}
+
+
+def test_strong_lines_are_no_trouble_under_jit():
+    """Water vapour has an exponential term of more than `TRACED_TAU` in a layer; slopes as well."""
+    air = standard_atmosphere("tropical", np.array([30e3, 8e3, 0.0]))
+    state = jax.tree.map(jnp.asarray, State(air, {"C04": 0.3}, Geometry(0.6, 0.8, 1.2)))
+    (group,) = columns_of_bands(state, BANDS, ALL_GASES, 3)
+    assert np.max(group.arguments["tau"]) > TRACED_TAU
+
+    def both(albedo):
+        changed = State(state.atmosphere, {"C04": albedo}, state.geometry)
+        return brf(changed, BANDS, **OPTIONS)[0]
+
+    found = jax.jit(jax.value_and_grad(both))(0.3)
+    expected = jax.value_and_grad(both)(0.3)
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
