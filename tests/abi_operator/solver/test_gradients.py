@@ -33,7 +33,7 @@ def small_columns(count=3):
 
 
 @pytest.mark.parametrize(
-    "num_streams", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (4, 8))]
+    "num_streams", [4, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 8))]
 )
 def test_finite_and_equal_in_both_modes_at_every_hard_place(num_streams):
     names, arguments = hard_columns(num_streams=num_streams)

@@ -181,6 +181,16 @@ def test_few_modes_leave_the_exact_single_scattering_alone(num_streams, fewer):
     assert all(more > 10 * less for more, less in pairwise(errors))
 
 
+def test_the_first_mode_is_the_mean_over_azimuths():
+    """Light scattered once, the same with all modes and with one, drops out of the difference."""
+    tau, ssa, moments, albedo, mu0, mu, _ = (np.repeat(x, 8, axis=0) for x in standard_columns(4))
+    azimuth = np.tile(np.pi * np.arange(8) / 4, 4)
+    columns = tau, ssa, moments, albedo, mu0, mu, azimuth
+    higher = (brf(columns) - brf(columns, num_modes=1)).reshape(4, 8)
+    assert np.all(np.ptp(higher, axis=1) > 1e-4)
+    np.testing.assert_allclose(higher.mean(axis=1), 0, atol=1e-14)
+
+
 def test_moment_zero_is_one_whatever_is_given():
     tau, ssa, moments, *rest = standard_columns()
     other = moments.copy()
@@ -191,8 +201,8 @@ def test_moment_zero_is_one_whatever_is_given():
 @pytest.mark.float32
 def test_float32_in_float32_out_and_near_float64():
     columns = [np.asarray(x, np.float32) for x in simple_columns(count=50)]
-    single = toa_brf(*columns, num_streams=8, num_doublings=5)
-    assert single.dtype == jnp.float32
+    single = brf(columns)
+    assert single.dtype == np.float32
     with jax.enable_x64(True):
         double = brf([np.asarray(x, np.float64) for x in columns])
     # Some thousand roundings of 6e-8 each, mostly of random sign.
