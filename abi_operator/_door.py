@@ -153,7 +153,7 @@ def _jvp(primals: Leaves, tangents: Leaves, *, program: Program, what: Any) -> A
     else:
         value, slopes = _bound(program, wanted, primals)
         axes = tuple(n for n, use in zip(program.own_axes, wanted, strict=True) if use)
-        change = _contracted(slopes, _chosen(tangents, wanted), value, axes)
+        change = _contracted(slopes, chosen(tangents, wanted), value, axes)
     return jax.tree.leaves(value), jax.tree.leaves(change)
 
 
@@ -186,7 +186,8 @@ def _batch(leaves: Leaves, axes: Sequence[Any], *, program: Program, what: Any) 
 batching.primitive_batchers[_columns] = _batch
 
 
-def _chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
+def chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
+    """Items that are wanted."""
     return [item for item, use in zip(items, wanted, strict=True) if use]
 
 
@@ -277,7 +278,7 @@ def slopes_by_reverse_mode(
         rest = iter(some)
         return value([next(rest) if use else x for x, use in zip(full, wanted, strict=True)])
 
-    result, pull_back = jax.vjp(of_wanted, _chosen(full, wanted))
+    result, pull_back = jax.vjp(of_wanted, chosen(full, wanted))
     outputs, structure = jax.tree.flatten(result)
     shapes = [x.shape[len(batch) :] for x in outputs]
     rows = np.eye(sum(math.prod(x) for x in shapes), dtype=outputs[0].dtype)

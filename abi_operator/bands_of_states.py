@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._batching import map_tiles, on_every_device, tile_size
+from ._door import Leaves, chosen
 from .atmosphere import State
 from .band_columns import BandColumns, columns_of_bands
 from .optics import num_terms
@@ -32,8 +33,6 @@ _TRACED_DOUBLINGS, _TRACED_STREAMS, _TRACED_MU = 6, 16, 0.05
 _SOLVER_TILES = 8
 # States are tiled by so many, which vector units take at a time.
 _VECTOR = 8
-
-Leaves = Sequence[Any]
 
 
 class Inputs(NamedTuple):
@@ -121,11 +120,6 @@ def values_and_slopes(
         return found, pull_back(jnp.ones_like(found))[0]
 
     return _tiled(both, leaves, structure, options, num_axes)
-
-
-def chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
-    """Items that are wanted."""
-    return [item for item, use in zip(items, wanted, strict=True) if use]
 
 
 def _tiled(

@@ -21,6 +21,7 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from .._batching import map_tiles
+from .._door import chosen
 
 Leaves = list[Float[Array, "*own batch"]]
 Slopes = list[Float[Array, "row *own batch"]]
@@ -62,7 +63,7 @@ def independent_columns(
             if gradient is None:
                 return _reverse_mode(value, leaves, wanted)
             result, slopes = gradient(jax.tree.unflatten(structure, leaves))
-            return result, _chosen(structure.flatten_up_to(slopes), wanted)
+            return result, chosen(structure.flatten_up_to(slopes), wanted)
 
         solution = jax.custom_jvp(_joining(value, tile))
 
@@ -70,16 +71,12 @@ def independent_columns(
             wanted = [_perturbs(tangent) for tangent in tangents[0]]
             both = _linearised(lambda leaves: value_and_slopes(leaves, wanted), tile)
             result, slopes = both(primals[0])
-            return result, _contracted(slopes, _chosen(tangents[0], wanted), result)
+            return result, _contracted(slopes, chosen(tangents[0], wanted), result)
 
         solution.defjvp(rule, symbolic_zeros=True)
         return solution(leaves)
 
     return solve
-
-
-def _chosen(items: Sequence[Any], wanted: Sequence[bool]) -> list[Any]:
-    return [item for item, use in zip(items, wanted, strict=True) if use]
 
 
 def _perturbs(tangent: Any) -> bool:
@@ -116,7 +113,7 @@ def _reverse_mode(
         rest = iter(some)
         return value([next(rest) if use else x for x, use in zip(leaves, wanted, strict=True)])
 
-    result, pull_back = jax.vjp(of_wanted, _chosen(leaves, wanted))
+    result, pull_back = jax.vjp(of_wanted, chosen(leaves, wanted))
     outputs = jax.tree.leaves(result)
     count, batch = sum(math.prod(x.shape[:-1]) for x in outputs), outputs[0].shape[-1]
 
