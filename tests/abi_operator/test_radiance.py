@@ -3,13 +3,13 @@
 import dataclasses
 from functools import cache
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from states import stacked
 
+import abi_operator
 from abi_operator import (
     Fire,
     Geometry,
@@ -132,14 +132,11 @@ def test_derivatives_in_temperatures_and_fire():
         (lambda s: s.albedo["C07"], 1e-4),
     )
 
-    batch = stacked([state, state])
-    reads = [read for read, _ in moved]
+    def total(batch):
+        return jnp.sum(radiance(batch, SEEN[1:], **OPTIONS))
 
-    def total(changed):
-        state = eqx.tree_at(lambda s: [read(s) for read in reads], batch, changed)
-        return jnp.sum(radiance(state, SEEN[1:], **OPTIONS))
-
-    slopes = jax.grad(total)([jnp.asarray(read(batch)) for read in reads])
+    slopes = jax.grad(total)(jax.tree.map(jnp.asarray, stacked([state, state])))
+    assert all(jnp.all(jnp.isfinite(x)) for x in jax.tree.leaves(slopes))
     ends = []
     for read, step in moved:
         for sign in (1, -1):
@@ -148,9 +145,16 @@ def test_derivatives_in_temperatures_and_fire():
             ends.append(jax.tree.unflatten(tree, leaves))
     found = seen(*ends)
     totals = (found["C06"] + found["C07"]).reshape(-1, 2)
-    for slope, (_, step), (above, below) in zip(slopes, moved, totals, strict=True):
+    for (read, step), (above, below) in zip(moved, totals, strict=True):
         difference = (above - below) / (2 * step)
-        np.testing.assert_allclose(slope, difference, rtol=1e-5)
+        np.testing.assert_allclose(read(slopes), difference, rtol=1e-5)
+
+
+def test_brightness_temperature_of_a_state_is_that_of_its_radiance():
+    state = make_state()
+    expected = brightness_temperature(jnp.asarray(seen(state, state)["C07"][0]), "C07")
+    found = abi_operator.brightness_temperature(state, **OPTIONS)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 def test_refused():
