@@ -43,12 +43,12 @@ class Program(Protocol):
         """Number of axes of each argument that belong to one column."""
         ...
 
-    def known(self, leaves: Leaves) -> Self:
-        """The program for columns that can be read; None for others."""
+    def known(self, leaves: Leaves, what: Any) -> Self:
+        """The program of `what` is wanted of columns that can be read."""
         ...
 
-    def unknown(self) -> Self:
-        """The program for columns that cannot be read."""
+    def unknown(self, what: Any) -> Self:
+        """The program of `what` is wanted of columns that cannot be read."""
         ...
 
     def own_result(self, leaves: Leaves) -> Any:
@@ -130,7 +130,7 @@ def _shapes(program: Program, what: Any, leaves: Leaves) -> Any:
 
 
 def _inlined(*leaves: Array, program: Program, what: Any) -> list[Array]:
-    return jax.tree.leaves(_jitted(what, False)(program.unknown(), list(leaves)))
+    return jax.tree.leaves(_jitted(what, False)(program.unknown(what), list(leaves)))
 
 
 mlir.register_lowering(_columns, mlir.lower_fun(_inlined, multiple_results=True))
@@ -139,7 +139,7 @@ mlir.register_lowering(_columns, mlir.lower_fun(_inlined, multiple_results=True)
 def _jvp(primals: Leaves, tangents: Leaves, *, program: Program, what: Any) -> Any:
     """Slopes beside values; second derivatives are JAX's own of the program of both."""
     if what != "value":
-        fixed = _fixed(program, primals)
+        fixed = _fixed(program, what, primals)
         full = [_with_zeros(x, t) for x, t in zip(primals, tangents, strict=True)]
 
         def both(*leaves: Array) -> list[Array]:
@@ -213,10 +213,10 @@ def _contracted(slopes: Leaves, tangents: Leaves, value: Any, own_axes: tuple[in
     )
 
 
-def _fixed(program: Program, leaves: Leaves) -> Program:
+def _fixed(program: Program, what: Any, leaves: Leaves) -> Program:
     """The program, with nothing left open."""
     traced = any(isinstance(x, Tracer) for x in leaves)
-    return program.unknown() if traced else program.known(leaves)
+    return program.unknown(what) if traced else program.known(leaves, what)
 
 
 def _call(program: Program, what: Any, leaves: Leaves) -> Any:
@@ -225,7 +225,7 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
     shapes = [np.shape(x)[:n] for x, n in zip(leaves, counts, strict=True)]
     batch = np.broadcast_shapes(*shapes)
     size = math.prod(batch)
-    fixed = program.known(leaves)
+    fixed = program.known(leaves, what)
     if size == 0 or not can_be_cut(leaves):
         return _jitted(what, False)(fixed, [jnp.asarray(x) for x in leaves])
     # Of one column alone, too, what is given without an axis is shared: the program is the same.

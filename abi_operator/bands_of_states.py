@@ -21,8 +21,8 @@ from .optics import num_terms
 from .solver import sufficient_doublings, toa_brf, toa_radiance
 
 TRACED_TAU = 1000.0
-"""Largest optical depth of a layer in columns that are solved without being read; of one that is
-opaque any depth will do. [-]"""
+"""Largest optical depth of a layer in columns of which slopes are made without being read; of one
+that is opaque any depth will do. [-]"""
 # Single-scattering albedo up to which a layer of that depth lets nothing through: no light comes
 # back from below exp(-69) of its way (diffusion exponent sqrt(3) (1 - ssa) or more).
 _OPAQUE_SSA = 0.96
@@ -87,7 +87,7 @@ def values(
     num_axes
         Axes of the batch.
     num_doublings
-        Doublings of every layer; None where nothing is known of the layers.
+        Doublings of every layer; None for as many as each needs.
     """
 
     def value(tile: Leaves) -> Array:
@@ -104,7 +104,12 @@ def values_and_slopes(
     num_doublings: int | None,
     wanted: tuple[bool, ...],
 ) -> tuple[Array, list[Array]]:
-    """Values, and the slopes ``*batch band *own`` of the leaves that are wanted."""
+    """Values, and the slopes ``*batch band *own`` of the leaves that are wanted.
+
+    Without a number of doublings nothing is known of the layers: see `TRACED_TAU`.
+    """
+    solved = _solved_unread if num_doublings is None else _solved
+    number = _traced_doublings(options) if num_doublings is None else num_doublings
 
     def both(tile: Leaves) -> tuple[Array, Leaves]:
         # Each band has its own copy of what is wanted, so that one pull gives all bands' slopes.
@@ -112,7 +117,7 @@ def values_and_slopes(
             own = iter(copies)
             merged = [next(own) if w else x for x, w in zip(tile, wanted, strict=True)]
             columns = _columns(merged, structure, options, wanted)
-            return _solved(columns, options, num_doublings)
+            return solved(columns, options, number)
 
         count = len(options.bands)
         copies = [jnp.broadcast_to(x, (count, *x.shape)) for x in chosen(tile, wanted)]
@@ -193,24 +198,36 @@ def _solved(
     groups: Sequence[BandColumns], options: Options, num_doublings: int | None
 ) -> Float[Array, "band batch"]:
     """One solve for the bands that have the same kind of ground and of light."""
-    number = _traced_doublings(options) if num_doublings is None else num_doublings
     found = {}
     for columns in groups:
-        door = toa_radiance if columns.emit else toa_brf
-        arguments: dict[str, Any] = columns.arguments
-        if num_doublings is None:
-            arguments = arguments | {"tau": _without_depth_of_opaque(columns)}
-        terms = door(
-            **arguments,
-            num_streams=options.num_streams,
-            num_modes=options.num_modes,
-            num_doublings=number,
-        )
-        if num_doublings is None:
-            thick = jnp.any(arguments["tau"] > TRACED_TAU, axis=-1)
-            terms = jnp.where(thick, jnp.nan, terms)
-        found |= columns.summed(terms)
+        found |= columns.summed(_terms(columns, columns.arguments, options, num_doublings))
     return jnp.stack([found[band] for band in options.bands])
+
+
+def _solved_unread(
+    groups: Sequence[BandColumns], options: Options, num_doublings: int
+) -> Float[Array, "band batch"]:
+    """The same, with doublings that suffice up to `TRACED_TAU`; beyond it is NaN."""
+    found = {}
+    for columns in groups:
+        arguments = columns.arguments | {"tau": _without_depth_of_opaque(columns)}
+        terms = _terms(columns, arguments, options, num_doublings)
+        thick = jnp.any(arguments["tau"] > TRACED_TAU, axis=-1)
+        # A factor, so that slopes are NaN as well.
+        found |= columns.summed(terms * jnp.where(thick, jnp.nan, 1).astype(terms.dtype))
+    return jnp.stack([found[band] for band in options.bands])
+
+
+def _terms(
+    columns: BandColumns, arguments: dict[str, Any], options: Options, num_doublings: int | None
+) -> Array:
+    door = toa_radiance if columns.emit else toa_brf
+    return door(
+        **arguments,
+        num_streams=options.num_streams,
+        num_modes=options.num_modes,
+        num_doublings=num_doublings,
+    )
 
 
 def _without_depth_of_opaque(columns: BandColumns) -> Array:

@@ -1,10 +1,12 @@
 """Optics and solver in one program, for states with values and for states without.
 
-How often the solver doubles its layers is a property of the program and chosen from the thickest
-layer of all columns. Its optical depth is read before the program is: at the door, in the rules of
-derivatives and in that of `jax.vmap`, all of which know the values that they transform (`_door`).
-Inside `jax.jit` or a loop nobody does, and the program is right for layers up to `TRACED_TAU`:
-columns with a thicker one come back as NaN, unless it lets no light through anyway.
+How often the solver doubles its layers is a property of a program for slopes and chosen from the
+thickest layer of all columns. Its optical depth is read before the program is: at the door, in the
+rules of derivatives and in that of `jax.vmap`, all of which know the values that they transform
+(`_door`). Inside `jax.jit` or a loop nobody does, and the slopes are right for layers up to
+`TRACED_TAU`: those of columns with a thicker one come back as NaN, and so do the values beside
+them, unless the layer lets no light through anyway. A program for values alone doubles each layer
+as it needs, whoever can read it (`solver.doublings`).
 """
 
 from collections.abc import Sequence
@@ -49,15 +51,15 @@ def solve(
 
 
 class _Program(NamedTuple):
-    """`_door.Program` of the leaves of `Inputs`; without a number of doublings it reads layers."""
+    """`_door.Program` of the leaves of `Inputs`, which for slopes reads the layers."""
 
     structure: Any
     options: Options
     own_axes: tuple[int, ...]
     num_doublings: int | None
 
-    def known(self, leaves: Leaves) -> "_Program":
-        if self.num_doublings is not None:
+    def known(self, leaves: Leaves, what: Any) -> "_Program":
+        if what == "value" or self.num_doublings is not None:
             return self
         geometry = jax.tree.unflatten(self.structure, leaves).state.geometry
         angles = [np.asarray(x) for x in (geometry.solar_zenith, geometry.view_zenith)]
@@ -70,7 +72,7 @@ class _Program(NamedTuple):
         number = sufficient_doublings(thickest, cosine, self.options.num_streams)
         return self._replace(num_doublings=number)
 
-    def unknown(self) -> "_Program":
+    def unknown(self, what: Any) -> "_Program":
         return self
 
     def own_result(self, leaves: Leaves) -> Any:
@@ -100,10 +102,10 @@ class _Depths(NamedTuple):
     options: Options
     own_axes: tuple[int, ...]
 
-    def known(self, leaves: Leaves) -> "_Depths":
+    def known(self, leaves: Leaves, what: Any) -> "_Depths":
         return self
 
-    def unknown(self) -> "_Depths":
+    def unknown(self, what: Any) -> "_Depths":
         return self
 
     def own_result(self, leaves: Leaves) -> Any:

@@ -47,10 +47,9 @@ def brf(
     gases
         Which of the atmosphere's gases absorb; ``()`` leaves them all out.
     num_streams, num_modes, num_doublings
-        Accuracy and cost of the solver; see `solver.toa_brf`. Where optical depths can be read,
-        outside `jax.jit` and loops (derivatives and `jax.vmap` included), `num_doublings` None
-        takes a number that is exact for the thickest layer. Inside, it takes enough for layers of
-        1000 and gives NaN in columns with a thicker one.
+        Accuracy and cost of the solver; see `solver.toa_brf`. With `num_doublings` None every layer
+        is exact, but for derivatives inside `jax.jit` and loops, where optical depths cannot be
+        read: columns with a layer thicker than 1000 are NaN there.
 
     Returns
     -------

@@ -35,6 +35,18 @@ def pytest_addoption(parser):
     parser.addoption(
         "--scale", type=float, default=1.0, help="share of a slow study's full counts to run"
     )
+    parser.addoption(
+        "--every", type=int, default=1, metavar="N", help="of the slow studies run one in N"
+    )
+
+
+def pytest_collection_modifyitems(config, items):
+    """One in so many of the slow studies, in their order: what they take is compiling."""
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    left_out = set(slow) - set(slow[:: config.getoption("--every")])
+    if left_out:
+        config.hook.pytest_deselected(items=list(left_out))
+        items[:] = [item for item in items if item not in left_out]
 
 
 @pytest.fixture

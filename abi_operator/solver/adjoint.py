@@ -16,10 +16,12 @@ from .._kernels import one_kernel
 from .adding import add_layer, top
 from .azimuth import mode_kernels
 from .bordered import Bordered
+from .doublings import Doublings
 from .ground import black
 from .layer import half_layer, node_functions
-from .layer_adjoint import Layers, Order
-from .mode_slopes import Kernels, Shared, mode_slopes, room
+from .layer_adjoint import Layers, Order, read
+from .mode_slopes import Kernels, Shared, mode_slopes
+from .room import Keeper
 
 _LATER = slice(1, None)  # modes but the mean
 _WHOLE = 2  # nodes up to which all layers of all modes are one kernel
@@ -56,38 +58,41 @@ class ModeSum(NamedTuple):
     weights: Float[Array, "mode *batch"]
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(1, 2))
+@partial(jax.custom_jvp, nondiff_argnums=(2,))
 def mode_sum(
-    inputs: ModeSum, num_doublings: int, single_scattering: bool
+    inputs: ModeSum, doublings: Doublings, single_scattering: bool
 ) -> Float[Array, "*batch"]:
     """Sum over the modes of weight times reflection, whose derivatives come from its gradient.
 
     Columns do not see each other. The rule is linear in the tangents, so that one gradient serves
     forward and reverse mode, and slopes that nobody asks for are not computed.
     """
-    value = partial(_reflectance, num_doublings=num_doublings, single_scattering=single_scattering)
+    value = partial(_reflectance, single_scattering=single_scattering)
     num_nodes = inputs.moments[0].shape[1]
     # With more nodes there is less to gain, and more than twice as much to compile.
-    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(inputs)
+    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(inputs, doublings)
 
 
 def _reflectance(
-    inputs: ModeSum, num_doublings: int, single_scattering: bool
+    inputs: ModeSum, doublings: Doublings, single_scattering: bool
 ) -> Float[Array, "*batch"]:
     modes = _Modes(inputs)
 
     def reflection(mean: bool, mode: _Mode) -> Array:
-        def put_on(stack, layers, odd, kernels, view_secant, *number):
+        def put_on(stack, layers, doublings, odd, kernels, view_secant, *number):
             # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
-            layer = layers.layer(number[0] if number else jnp.zeros_like(odd), odd)
+            place = number[0] if number else jnp.zeros_like(odd)
+            layer = layers.layer(place, odd)
             a, p = layer.matrices(mean, kernels, view_secant, single_scattering)
-            return add_layer(stack, *half_layer(a, p, layer.tau, num_doublings), layer.tau)
+            own = jax.tree.map(lambda x: read(x, place), doublings)
+            return add_layer(stack, *half_layer(a, p, layer.tau, own), layer.tau)
 
         put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
         kernels, view_secant = _kernels(mode.nodes, mode.beams), inputs.view_secant
+        shared = modes.layers, doublings, mode.order.odd, kernels, view_secant
 
         def add(stack, *number):
-            return put_on(stack, modes.layers, mode.order.odd, kernels, view_secant, *number), None
+            return put_on(stack, *shared, *number), None
 
         ground = modes.ground(mode, mean)
         numbers = jnp.arange(inputs.tau.shape[0], dtype=inputs.tau.dtype)
@@ -106,8 +111,9 @@ def _reflectance(
 
 
 @partial(mode_sum.defjvp, symbolic_zeros=True)
-def _mode_sum_jvp(num_doublings, single_scattering, primals, tangents):
-    value, gradient = reflectance_and_gradient(primals[0], num_doublings, single_scattering)
+def _mode_sum_jvp(single_scattering, primals, tangents):
+    inputs, doublings = primals
+    value, gradient = reflectance_and_gradient(inputs, doublings, single_scattering)
     change = jnp.zeros_like(value)
     for slope, tangent in zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents[0]), strict=True):
         if not isinstance(tangent, SymbolicZero):
@@ -115,22 +121,26 @@ def _mode_sum_jvp(num_doublings, single_scattering, primals, tangents):
     return value, change
 
 
+@partial(jax.custom_jvp, nondiff_argnums=(2,))
 def reflectance_and_gradient(
-    inputs: ModeSum, num_doublings: int, single_scattering: bool
+    inputs: ModeSum, doublings: Doublings, single_scattering: bool
 ) -> tuple[Float[Array, "*batch"], ModeSum]:
     """Sum over the modes of weight times reflection, and its slope in every input.
 
     Each column's slope is that of its own value. Slopes in the ground's cores are symmetric.
+    `Doublings.most` must be given: there is room for so many.
     """
+    if doublings.most is None:
+        raise TypeError("slopes need a largest number of doublings.")
     modes = _Modes(inputs)
-    how = num_doublings, single_scattering
+    how = doublings, single_scattering
     shared = Shared(modes.layers, inputs.view_secant)
 
     def step(carry, mode):
-        value, slopes, of_mean, kept = carry
+        value, slopes, of_mean, room = carry
         kernels, ground = _kernels(mode.nodes, mode.beams), modes.ground(mode)
-        reflection, kept, found = mode_slopes(
-            shared, *how, mode.order, kernels, ground, mode.weight, slopes, kept
+        reflection, room, found = mode_slopes(
+            shared, *how, mode.order, kernels, ground, mode.weight, slopes, room
         )
         if inputs.grounds is None:
             mean = mode.order.mean
@@ -138,10 +148,10 @@ def reflectance_and_gradient(
         own = None if inputs.grounds is None else found.ground
         value = value + mode.weight * reflection
         beams = found.even_beams, found.odd_beams
-        return (value, found.shared, of_mean, kept), (reflection, beams, own)
+        return (value, found.shared, of_mean, room), (reflection, beams, own)
 
     nothing = jax.tree.map(jnp.zeros_like, (inputs.view_secant, shared, inputs.ground))
-    space = room(inputs.tau, modes.num_nodes, num_doublings)
+    space = Keeper(inputs.tau, modes.num_nodes, doublings.most).empty()
     carry, rows = jax.lax.scan(step, (*nothing, space), modes.all())
     (value, slopes, of_mean, _), (reflections, beams, of_grounds) = carry, rows
     if of_grounds is not None:
@@ -160,6 +170,16 @@ def reflectance_and_gradient(
         weights=reflections,
     )
     return value, gradient
+
+
+@reflectance_and_gradient.defjvp
+def _second_derivative(single_scattering, primals, tangents):
+    inputs, doublings = primals
+
+    def written_out(inputs):
+        return reflectance_and_gradient.fun(inputs, doublings.written_out(), single_scattering)
+
+    return jax.jvp(written_out, (inputs,), tangents[:1])
 
 
 class _Mode(NamedTuple):

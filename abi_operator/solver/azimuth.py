@@ -12,6 +12,7 @@ from .._kernels import one_kernel
 from .adding import Emission, Top, add_emitting_layer, add_layer, top
 from .bordered import Bordered, Vector
 from .delta_m import ScaledLayers
+from .doublings import Doublings
 from .ground import black
 from .layer import ModeKernels, conservative, half_layer, layer_matrix, node_functions
 from .legendre import associated_legendre
@@ -84,7 +85,7 @@ def azimuthal_mean(
     directions: Directions,
     ground: Bordered,
     *,
-    num_doublings: int,
+    doublings: Doublings,
     single_scattering: bool,
 ) -> Top:
     """Mode 0, the only one in which energy is kept.
@@ -95,16 +96,16 @@ def azimuthal_mean(
         Scaled layers, top first, with as many moments as streams; Legendre functions; beams.
     ground
         Its admittance in mode 0.
-    num_doublings, single_scattering
+    doublings, single_scattering
         See `higher_modes`.
     """
-    how = num_doublings, single_scattering
 
     def add(stack, layer, kernels, directions):
-        _, admittance, impedance = _half_layer_of_the_mean(layer, kernels, directions, *how)
+        of_mean = _half_layer_of_the_mean(layer, kernels, directions, single_scattering)
+        _, admittance, impedance = of_mean
         return add_layer(stack, admittance, impedance, layer[0])
 
-    properties = _properties_of_the_mean(layers, directions)
+    properties = _properties_of_the_mean(layers, directions, doublings)
     return top(_scan_upwards(add, ground, properties, tables.kernels(0), directions))
 
 
@@ -117,29 +118,29 @@ def emitting_mean(
     one: Vector,
     planck_jumps: Float[Array, "layer *batch"] | None,
     *,
-    num_doublings: int,
+    doublings: Doublings,
     single_scattering: bool,
 ) -> tuple[Top, Emission]:
     """Mode 0 with light that the ground and the layers emit, or that the ground loses.
 
     Parameters
     ----------
-    layers, tables, directions, ground, num_doublings, single_scattering
+    layers, tables, directions, ground, doublings, single_scattering
         As in `azimuthal_mean`.
     emission, one
         Light of the ground (`adding.emitting_ground`); the vector of isotropic light.
     planck_jumps
         Increase of the Planck function from top to bottom of each layer; None for cold air.
     """
-    how = num_doublings, single_scattering
 
     def add(carry, x, kernels, directions, one):
         (stack, emission), (layer, planck_jump) = carry, x
-        b_inverse, admittance, impedance = _half_layer_of_the_mean(layer, kernels, directions, *how)
+        of_mean = _half_layer_of_the_mean(layer, kernels, directions, single_scattering)
+        b_inverse, admittance, impedance = of_mean
         jump = None if planck_jump is None else planck_jump * (b_inverse @ one)
         return add_emitting_layer(stack, emission, admittance, impedance, layer[0], jump)
 
-    xs = (_properties_of_the_mean(layers, directions), planck_jumps)
+    xs = (_properties_of_the_mean(layers, directions, doublings), planck_jumps)
     shared = tables.kernels(0), directions, one
     stack, emission = _scan_upwards(add, (ground, emission), xs, *shared)
     return top(stack), emission
@@ -159,19 +160,22 @@ def _scan_upwards(add: Callable, stack: Any, layers: Any, kernels: Any, *shared:
     return jax.lax.scan(jax.checkpoint(step), stack, layers, reverse=True)[0]
 
 
-def _properties_of_the_mean(layers: ScaledLayers, directions: Directions) -> tuple[Array, ...]:
-    return (layers.tau, layers.coalbedo, directions.sun_secants, *weighted_moments(layers))
+def _properties_of_the_mean(
+    layers: ScaledLayers, directions: Directions, doublings: Doublings
+) -> tuple[Any, ...]:
+    moments = weighted_moments(layers)
+    return (layers.tau, layers.coalbedo, directions.sun_secants, *moments, doublings)
 
 
 def _half_layer_of_the_mean(
-    layer, kernels, directions, num_doublings, single_scattering
+    layer, kernels, directions, single_scattering
 ) -> tuple[Bordered, Bordered, Bordered]:
-    tau, coalbedo, sun, moments_a, moments_b = layer
+    tau, coalbedo, sun, moments_a, moments_b, doublings = layer
     secants = directions.secants(sun)
     a = layer_matrix(kernels[0], moments_a, secants, single_scattering)
     a = conservative(a, coalbedo)
     b_inverse = layer_matrix(kernels[1], moments_b, secants, single_scattering).inverse()
-    return b_inverse, *half_layer(a, b_inverse, tau, num_doublings)
+    return b_inverse, *half_layer(a, b_inverse, tau, doublings)
 
 
 def higher_modes(
@@ -181,7 +185,7 @@ def higher_modes(
     grounds: Bordered | None,
     relative_azimuth: Float[Array, "view *batch"],
     *,
-    num_doublings: int,
+    doublings: Doublings,
     single_scattering: bool,
 ) -> Float[Array, "view *batch"]:
     r"""Sum over the modes m > 0 of :math:`(-1)^m \cos(m\,\Delta\phi)` times twice their reflection.
@@ -195,8 +199,8 @@ def higher_modes(
         Lambertian ground, which these modes do not see.
     relative_azimuth
         Of each view, 0 in backscatter. [rad]
-    num_doublings
-        Doublings of each layer.
+    doublings
+        Of each layer.
     single_scattering
         Whether the modes contain the light scattered once in a layer and nowhere else.
     """
@@ -204,11 +208,11 @@ def higher_modes(
     dtype, num_streams = relative_azimuth.dtype, layers.moments.shape[1]
 
     def add(stack, layer, kernels, directions):
-        tau, sun, moments_a, moments_b = layer
+        tau, sun, moments_a, moments_b, doublings = layer
         secants = directions.secants(sun)
         a = layer_matrix(kernels[0], moments_a, secants, single_scattering)
         b_inverse = layer_matrix(kernels[1], moments_b, secants, single_scattering).inverse()
-        admittance, impedance = half_layer(a, b_inverse, tau, num_doublings)
+        admittance, impedance = half_layer(a, b_inverse, tau, doublings)
         return add_layer(stack, admittance, impedance, tau)
 
     def step(total, x):
@@ -216,7 +220,8 @@ def higher_modes(
         if ground is None:
             ground = black(directions.cosines, num_streams)
         kernels = tuple(mode_kernels(n, v) for n, v in zip(nodes, beams, strict=True))
-        xs = (layers.tau, directions.sun_secants, moments[m % 2], moments[1 - m % 2])
+        parities = moments[m % 2], moments[1 - m % 2]
+        xs = (layers.tau, directions.sun_secants, *parities, doublings)
         stack = _scan_upwards(add, ground, xs, kernels, directions)
         sign = jnp.where(m % 2 == 0, 2, -2).astype(dtype)
         angle = m.astype(dtype) * relative_azimuth

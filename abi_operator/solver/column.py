@@ -50,7 +50,10 @@ OWN_AXES = {
 
 
 class Options(NamedTuple):
-    """What is static in a program of the solver."""
+    """What is static in a program of the solver; see `toa_brf`.
+
+    Without a number of doublings every layer of a value has its own (`doublings`).
+    """
 
     num_streams: int
     num_modes: int

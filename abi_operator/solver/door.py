@@ -45,8 +45,6 @@ def prepare(
         given = (column if checked is None else checked)._asdict()
         summed = single_scattering == "tms" and column.phase_function is None
         check_arguments({k: x for k, x in given.items() if x is not None}, series_summed=summed)
-    if num_doublings is None:
-        num_doublings = choose_doublings(column, num_streams)
     return Options(
         num_streams,
         num_streams if num_modes is None else num_modes,
@@ -82,7 +80,7 @@ def solve(
 
 
 class _Program(NamedTuple):
-    """`_door.Program` of the arguments of a door."""
+    """`_door.Program` of the arguments of a door; for slopes it has a number of doublings."""
 
     tile: Callable[[Column, Options], Any]
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None
@@ -95,15 +93,15 @@ class _Program(NamedTuple):
     def own_axes(self) -> tuple[int, ...]:
         return tuple(len(own_axes(name, self.multiple_views)) for name in names(self.structure))
 
-    def known(self, leaves: Leaves) -> "_Program":
-        if self.options.num_doublings is not None:
+    def known(self, leaves: Leaves, what: Any) -> "_Program":
+        if what == "value" or self.options.num_doublings is not None:
             return self
         column = jax.tree.unflatten(self.structure, leaves)
         number = choose_doublings(column, self.options.num_streams)
         return self._replace(options=self.options._replace(num_doublings=number))
 
-    def unknown(self) -> "_Program":
-        if self.options.num_doublings is not None:
+    def unknown(self, what: Any) -> "_Program":
+        if what == "value" or self.options.num_doublings is not None:
             return self
         number = unknown_doublings(self.options.num_streams)
         return self._replace(options=self.options._replace(num_doublings=number))

@@ -1,6 +1,19 @@
-"""How often a layer must be doubled for the rational start to be exact."""
+"""How often a layer must be doubled for the rational start to be exact, and by which numbers.
 
+The number is data: every layer of a tile has its own, for the column of the tile that asks for most
+(`layer_doublings`), so that one program serves all columns, and a thin layer does not pay for a
+thick one. A program for slopes has room for so many, which is part of it (`sufficient_doublings`):
+what it keeps on the way up is as much as there are doublings.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from .quadrature import double_gauss
 
@@ -8,11 +21,109 @@ from .quadrature import double_gauss
 # 0, 1, 2, 3, 4 times, errs by 1e-12 or less; four times as much for each doubling after that.
 _REACH = (0.0356, 0.0713, 0.142, 0.287, 179.0)
 
-# Numbers of doublings that `num_doublings=None` chooses from: few, so that few programs compile.
-_BUCKETS = (1, 4, 5, 6, 8, 14)
+# Largest numbers that `num_doublings=None` chooses from for slopes: few, so that few programs
+# compile.
+_BUCKETS = (4, 6, 8, 14)
 
 # What a program must be right for when its layers are not known as it is traced.
 _UNKNOWN_TAU, _UNKNOWN_MU = 1e5, 1e-3
+
+# Doublings of a layer whose number is data, at most: enough for z = 1e37, near float32's largest.
+_MOST = 64
+
+
+class Doublings(eqx.Module):
+    """Doublings of a layer, or of all layers on a first axis.
+
+    Parameters
+    ----------
+    numbers
+        The number of doublings; the part of the layer's thickness that is half of what the start is
+        made for; the start's d (`start_coefficient`). Not integers, which have no tangents in a
+        kernel. None where they are those of `most`, written out one by one.
+    most
+        No number is larger; None where nothing depends on it. JAX takes derivatives of so many
+        doublings written out, since reverse mode goes through no loop of a length that is data.
+    """
+
+    numbers: Float[Array, "*layer 3"] | None
+    most: int | None = eqx.field(static=True)
+
+    def of_layer(self) -> tuple[Any, Any, Any]:
+        """The three numbers of one layer."""
+        if self.numbers is None:
+            assert self.most is not None
+            return _numbers(self.most)
+        return self.numbers[0].astype(jnp.int32), self.numbers[1], self.numbers[2]
+
+    def written_out(self) -> "Doublings":
+        """As many for every layer, for JAX to take derivatives of."""
+        if self.most is None:
+            raise TypeError("doublings without a largest number cannot be written out.")
+        return Doublings(None, self.most)
+
+
+def repeated(body: Callable[[Any, Any], Any], number: Any, carry: Any) -> Any:
+    """``carry = body(k, carry)`` for k below a number, which may be data."""
+    if isinstance(number, int):
+        for k in range(number):
+            carry = body(k, carry)
+        return carry
+    return jax.lax.fori_loop(jnp.zeros_like(number), number, body, carry)
+
+
+def start_coefficient(num_doublings: int) -> float:
+    r"""The number d in the start of `layer.half_layer`.
+
+    The start agrees with :math:`\sqrt x\coth\sqrt x` to the second order for any d. From four
+    doublings on d = 10/21, the continued fraction, right to one order more. Below, d = 11/30 keeps
+    the start near 1 up to larger x, so that doubling, which pulls everything there to 1, settles
+    one or two steps earlier: for layers up to tau = 3 and one of 30, two doublings are right to
+    6e-6 of the reflectance at 4 and 8 streams and to 3e-5 at 16 (`benchmarks/solver.py`).
+    """
+    return 11 / 30 if num_doublings <= 3 else 10 / 21
+
+
+def layer_doublings(
+    tau: Float[Array, "layer *batch"],
+    secants: Float[Array, "beam layer *batch"],
+    num_streams: int,
+    most: int | None,
+) -> Doublings:
+    """Doublings of every layer of a tile: the fewest that are exact for all its columns.
+
+    Parameters
+    ----------
+    tau
+        Optical depth of the layers as they are solved. [-]
+    secants
+        By which the beams are attenuated. [-]
+    num_streams
+        Number of streams; their smallest cosine counts as well.
+    most
+        Doublings of a layer, at most; None for no limit but `_MOST`.
+
+    Columns that are not finite do not count.
+    """
+    limit = _MOST if most is None else most
+    tau, secants = jax.lax.stop_gradient((tau, secants))
+    steepest = jnp.maximum(jnp.max(secants, axis=0), 1 / double_gauss(num_streams)[0][0].item())
+    z = 0.5 * tau * steepest
+    z = jnp.where(jnp.isfinite(z), z, 0).reshape(tau.shape[0], -1)
+    thickest = jnp.max(z, axis=1, initial=0)
+    reach = np.array([_reach(k) for k in range(limit)])
+    reach = jnp.asarray(np.minimum(reach, np.finfo(tau.dtype).max), tau.dtype)
+    count = jnp.sum(thickest[:, None] > reach, axis=1)
+    table = np.array([_numbers(k) for k in range(limit + 1)])
+    return Doublings(jnp.asarray(table, tau.dtype)[count], most)
+
+
+def _reach(doublings: int) -> float:
+    return _REACH[doublings] if doublings < 5 else _REACH[4] * 4.0 ** (doublings - 4)
+
+
+def _numbers(doublings: int) -> tuple[int, float, float]:
+    return doublings, 0.5 / 2**doublings, start_coefficient(doublings)
 
 
 def sufficient_doublings(max_tau: float, min_mu: float, num_streams: int) -> int:
@@ -29,8 +140,7 @@ def sufficient_doublings(max_tau: float, min_mu: float, num_streams: int) -> int
     """
     z = max_tau / (2 * min(min_mu, double_gauss(num_streams)[0][0]))
     for doublings in _BUCKETS:
-        reach = _REACH[doublings] if doublings < 5 else _REACH[4] * 4.0 ** (doublings - 4)
-        if z <= reach:
+        if z <= _reach(doublings):
             return doublings
     excess = int(np.ceil(np.log(z / _REACH[4]) / np.log(4)))
     return 4 + excess

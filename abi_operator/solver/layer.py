@@ -14,17 +14,21 @@ through the admittance Y and the impedance of its half,
 
 phi is even in the square root, hence smooth: there is nothing to diagonalise, nothing special about
 ssa = 1 (a zero eigenvalue), and every derivative exists. A rational phi serves thin layers; a thick
-one starts from its 2^K-th part and doubles K times by the addition theorem of tanh. Nothing is
-divided by h, so that empty layers need no care.
+one starts from its 2^K-th part and doubles K times by the addition theorem of tanh (`doublings`).
+Nothing is divided by h, so that empty layers need no care.
 """
 
+from functools import partial
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .._numerics import matmul, total, weighted_sum
 from .bordered import Bordered, combined
+from .doublings import Doublings, repeated
 from .legendre import associated_legendre
 from .quadrature import double_gauss
 from .quotient import minus_quotient
@@ -109,20 +113,8 @@ def conservative(matrix: Bordered, coalbedo: Float[Array, "*batch"]) -> Bordered
     return eqx.tree_at(lambda m: m.core, matrix, core)
 
 
-def start_coefficient(num_doublings: int) -> float:
-    r"""The number d in the start of `half_layer`.
-
-    The start agrees with :math:`\sqrt x\coth\sqrt x` to the second order for any d. From four
-    doublings on d = 10/21, the continued fraction, right to one order more. Below, d = 11/30 keeps
-    the start near 1 up to larger x, so that doubling, which pulls everything there to 1, settles
-    one or two steps earlier: for layers up to tau = 3 and one of 30, two doublings are right to
-    6e-6 of the reflectance at 4 and 8 streams and to 3e-5 at 16 (`benchmarks/solver.py`).
-    """
-    return 11 / 30 if num_doublings <= 3 else 10 / 21
-
-
 def half_layer(
-    a: Bordered, b_inverse: Bordered, tau: Float[Array, "*batch"], num_doublings: int
+    a: Bordered, b_inverse: Bordered, tau: Float[Array, "*batch"], doublings: Doublings
 ) -> tuple[Bordered, Bordered]:
     r"""Admittance Y and h-fold impedance Z of half a layer, from A and the inverse of B.
 
@@ -131,7 +123,7 @@ def half_layer(
     .. math::
        \varphi(x)^{-1} = 1 + x\left(\frac13 - \frac{x/9}{5 + dx}\right),
 
-    with d = `start_coefficient`. With x = h^2 BA and matrices that stay symmetric,
+    with d of `doublings.start_coefficient`. With x = h^2 BA and matrices that stay symmetric,
     :math:`C = A/3 - (h^2/9) A (5B^{-1} + dh^2A)^{-1}A`, Z = B^-1 + h^2 C and
     :math:`Y = hA - h^3 A Z^{-1} C`. Doubling is
 
@@ -141,16 +133,31 @@ def half_layer(
     -------
     Y (tanh) and Z = h coth in the same units, with h = tau / 2.
     """
-    h = tau * (0.5 / 2**num_doublings)
+    return _half_layer(a, b_inverse, tau, doublings)
+
+
+@jax.custom_jvp
+def _half_layer(a, b_inverse, tau, doublings):
+    number, step, start = doublings.of_layer()
+    h = tau * step
     square = h * h
-    start = start_coefficient(num_doublings)
     inner = combined([5.0, start * square], [b_inverse, a])
     fraction = minus_quotient([(1 / 3, a)], square / 9, a, inner, a)
     impedance = combined([1.0, square], [b_inverse, fraction])
     admittance = minus_quotient([(h, a)], h * square, a, impedance, fraction)
-
-    for _ in range(num_doublings):
-        impedance = combined([1.0, h], [impedance, admittance])
-        admittance = minus_quotient([(2.0, admittance)], 2 * h, admittance, impedance, admittance)
-        h = 2 * h
+    admittance, impedance, _ = repeated(_doubled, number, (admittance, impedance, h))
     return admittance, impedance
+
+
+@_half_layer.defjvp
+def _half_layer_jvp(primals, tangents):
+    *primals, doublings = primals
+    written_out = partial(_half_layer.fun, doublings=doublings.written_out())
+    return jax.jvp(written_out, tuple(primals), tangents[:3])
+
+
+def _doubled(_, carry):
+    admittance, impedance, h = carry
+    impedance = combined([1.0, h], [impedance, admittance])
+    admittance = minus_quotient([(2.0, admittance)], 2 * h, admittance, impedance, admittance)
+    return admittance, impedance, 2 * h

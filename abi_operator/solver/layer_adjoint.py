@@ -1,6 +1,6 @@
 """One layer on the way up, which keeps what the way down needs, and on the way down."""
 
-from functools import partial
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -10,8 +10,9 @@ from jaxtyping import Array, Float
 from .._kernels import one_kernel, small_enough
 from .._numerics import fenced
 from .bordered import Bordered, combined, reciprocal
+from .doublings import Doublings, repeated
 from .fields import Action, Feed, Fields, act, advance, cotangents, feed
-from .layer import ModeKernels, conservative, layer_matrix, start_coefficient
+from .layer import ModeKernels, conservative, layer_matrix
 from .pull_back import undo_start, undouble
 from .quotient import Quotient, minus_and_quotient
 
@@ -126,87 +127,113 @@ class _Part(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What the way down needs of a layer; diagonals inside it are formed again."""
+    """What the way down needs of a layer but for its doublings; diagonals are formed again."""
 
     b_inverse: Bordered
     a: Feed
     fraction: Feed
     inner: _Part
     by_a: _Part
-    admittances: list[Feed]
-    doublings: list[_Part]
     adding: Action
+
+
+class Doubled(NamedTuple):
+    """What the way down needs of a doubling, of Y before it; the rest is formed again."""
+
+    quotient: _Part
+    right: Feed
+
+
+def climb(
+    stack: Bordered,
+    a: Bordered,
+    p: Bordered,
+    tau: Float[Array, "*batch"],
+    doublings: Doublings,
+    room: Any,
+    keep: Callable[[Any, Doubled, Any], Any],
+) -> tuple[Bordered, Kept, Any]:
+    """Put a layer of A and p = B^-1 on a stack: `layer.half_layer` and `adding.add_layer`.
+
+    `keep` gives a room with a doubling in it, the number of which it is told.
+    """
+    number, step, start = doublings.of_layer()
+    h = tau * step
+    square = h * h
+    inner = combined([5.0, start * square], [p, a])
+    fraction, inner = minus_and_quotient([(1 / 3, a)], square / 9, a, inner, a)
+    z = combined([1.0, square], [p, fraction])
+    # A Z^-1 C from the other side, whose quotient gives that by C by another (`undo_start`).
+    y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a)
+
+    def double(k, carry):
+        y, z, h, room = carry
+        z = combined([1.0, h], [z, y])
+        right = feed(y)
+        y, quotient = minus_and_quotient([(2.0, y)], 2 * h, y, z, y)
+        return y, z, 2 * h, keep(room, Doubled(_part(quotient), right), k)
+
+    if doublings.most:
+        y, z, _, room = repeated(double, number, (y, z, h, room))
+    h = 0.5 * tau
+    total = combined([1.0, 1.0], [stack, y])
+    middle = combined([h, 0.5, 0.5 * h], [stack, z, y])
+    stack, quotient = minus_and_quotient([(1.0, total), (1.0, y)], h, total, middle, total)
+    stack = Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
+    part = _part(quotient)
+    adding = Action(*part, quotient.ratio, quotient.over, feed(total), feed(middle))
+    kept = Kept(p, feed(a), feed(fraction), _part(inner), _part(by_a), adding)
+    return stack, kept, room
 
 
 def _part(quotient: Quotient) -> _Part:
     return _Part(quotient.core, quotient.border)
 
 
-def climb(
-    stack: Bordered, a: Bordered, p: Bordered, tau: Float[Array, "*batch"], num_doublings: int
-) -> tuple[Bordered, Kept]:
-    """Put a layer of A and p = B^-1 on a stack: `layer.half_layer` and `adding.add_layer`."""
-    h = tau * (0.5 / 2**num_doublings)
-    square = h * h
-    inner = combined([5.0, start_coefficient(num_doublings) * square], [p, a])
-    fraction, inner = minus_and_quotient([(1 / 3, a)], square / 9, a, inner, a)
-    z = combined([1.0, square], [p, fraction])
-    # A Z^-1 C from the other side, whose quotient gives that by C by another (`undo_start`).
-    y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a)
-    admittances, doublings = [], []
-    for _ in range(num_doublings):
-        z = combined([1.0, h], [z, y])
-        admittances.append(feed(y))
-        y, quotient = minus_and_quotient([(2.0, y)], 2 * h, y, z, y)
-        doublings.append(_part(quotient))
-        h = 2 * h
-    total = combined([1.0, 1.0], [stack, y])
-    middle = combined([h, 0.5, 0.5 * h], [stack, z, y])
-    stack, quotient = minus_and_quotient([(1.0, total), (1.0, y)], h, total, middle, total)
-    stack = Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
-    part = _part(quotient)
-    adding = Action(
-        part.core, part.border, quotient.ratio, quotient.over, feed(total), feed(middle)
-    )
-    kept = Kept(
-        p,
-        feed(a),
-        feed(fraction),
-        _part(inner),
-        _part(by_a),
-        admittances,
-        doublings,
-        adding,
-    )
-    return stack, kept
-
-
 class _Beams(NamedTuple):
-    """Beams' own entries of a layer's quotients: of right over middle, and 1 over the middle.
+    """Beams' own entries of the start's quotients: of right over middle, and 1 over the middle.
 
-    Of V, U and W of the start, then of each doubling.
+    And those of Y and Z that the start leaves.
     """
 
-    ratios: list[Float[Array, "beam *batch"]]
-    overs: list[Float[Array, "beam *batch"]]
+    ratio_v: Float[Array, "beam *batch"]
+    ratio_u: Float[Array, "beam *batch"]
+    ratio_w: Float[Array, "beam *batch"]
+    over_v: Float[Array, "beam *batch"]
+    over_u: Float[Array, "beam *batch"]
+    y: Float[Array, "beam *batch"]
+    z: Float[Array, "beam *batch"]
 
 
-def _own_beams(a, p, h, num_doublings: int) -> _Beams:
-    """As on the way up; the doublings are those of numbers."""
+def _own_beams(a, p, h, d) -> _Beams:
+    """As on the way up."""
     square = h * h
-    over = reciprocal(_inner_middle(p, a, start_coefficient(num_doublings) * square))
-    fraction, ratio = _fraction(a, over, square / 9)
+    over_v = reciprocal(_inner_middle(p, a, d * square))
+    fraction, ratio_v = _fraction(a, over_v, square / 9)
     z = _sum(p, square, fraction)
-    overs = [over, reciprocal(z)]
-    ratios = [ratio, *_times(overs[1], a, fraction)]
-    y = _less(h, a, h * square, a, ratios[2])
-    for k in range(num_doublings):
-        step = h * 2.0**k
-        z = _sum(z, step, y)
-        overs.append(reciprocal(z))
-        ratios += _times(overs[-1], y)
-        y = _less(2.0, y, 2 * step, y, ratios[-1])
-    return _Beams(ratios, [over, overs[1], *overs[1:]])
+    over_u = reciprocal(z)
+    ratio_u, ratio_w = _times(over_u, a, fraction)
+    y = _less(h, a, h * square, a, ratio_w)
+    return _Beams(ratio_v, ratio_u, ratio_w, over_v, over_u, y, z)
+
+
+class _Step(NamedTuple):
+    """What beams see of Y and Z between two doublings."""
+
+    y: Float[Array, "beam *batch"]
+    z: Float[Array, "beam *batch"]
+    z_feed: Feed
+    h: Float[Array, "*batch"]
+
+
+def _next_step(step: _Step, y_feed: Feed) -> tuple[_Step, Array, Array]:
+    """After a doubling; and the ratio, and 1 over the middle, of its quotient."""
+    y, z, z_feed, h = step
+    z_feed = combined([1.0, h], [z_feed, y_feed])
+    z = _sum(z, h, y)
+    over = reciprocal(z)
+    (ratio,) = _times(over, y)
+    return _Step(_less(2.0, y, 2 * h, y, ratio), z, z_feed, 2 * h), ratio, over
 
 
 @fenced
@@ -240,46 +267,101 @@ def descend(
     tau: Float[Array, "*batch"],
     secants: Float[Array, "2 *batch"],
     kept: Kept,
-    num_doublings: int,
+    doublings: Doublings,
+    doubled: Callable[[Any], Doubled],
 ) -> tuple[Fields, Bordered, Bordered]:
-    """Fields below a layer from those above; cotangents of A and B^-1 over h (`mode_slopes`)."""
+    """Fields below a layer from those above; cotangents of A and B^-1 over h (`mode_slopes`).
+
+    `doubled` gives what `climb` kept of a doubling.
+    """
     h = 0.5 * tau
     drop = act(kept.adding, fields)
     mean = advance(fields, drop, 0.5 * h)
     below = advance(mean, drop, 0.5 * h)  # last of `fields`, so that XLA can write over them
 
-    start = tau * (0.5 / 2**num_doublings)
+    number, step, d = doublings.of_layer()
+    start = tau * step
     square = start * start
-    own_beams = partial(_own_beams, num_doublings=num_doublings)
+    own_beams, next_step = _own_beams, _next_step
     if not small_enough(fields.nodes.shape[0], tau.dtype):
-        own_beams = one_kernel(own_beams, 1)
-    own = own_beams(secants, kept.b_inverse.diagonal, start)
+        own_beams, next_step = (one_kernel(f, 1) for f in (own_beams, next_step))
+    own = own_beams(secants, kept.b_inverse.diagonal, start, jnp.asarray(d, tau.dtype))
     p = feed(kept.b_inverse)
-    z = [combined([1.0, square], [p, kept.fraction])]
-    for k, y in enumerate(kept.admittances):
-        z.append(combined([1.0, start * 2.0**k], [z[-1], y]))
-    inner = combined([5.0, start_coefficient(num_doublings) * square], [p, kept.a])
-    quotients = [
-        Action(part.core, part.border, ratio, over, y, middle)
-        for part, ratio, over, y, middle in zip(
-            kept.doublings, own.ratios[3:], own.overs[3:], kept.admittances, z[1:], strict=True
-        )
-    ]
-
-    nodes = fields.nodes.shape[0]
-    by_fields = min(num_doublings, _BY_FIELDS_OF_FEW if nodes <= _FEW_NODES else _BY_FIELDS)
-    left = num_doublings - by_fields
-    steps = [(quotients[k], start * 2.0**k) for k in reversed(range(left, num_doublings))]
-    y_bar, z_bar = cotangents(mean, drop, steps)
-    for k in reversed(range(left)):
-        y_bar, z_bar = undouble(quotients[k], start * 2.0**k, y_bar, z_bar)
+    z = combined([1.0, square], [p, kept.fraction])
+    inner = combined([5.0, d * square], [p, kept.a])
+    doubling = _Doublings(_Step(own.y, own.z, z, start), doubled, next_step)
+    y_bar, z_bar = _undoubled(mean, drop, tau, number, doublings.most, doubling)
     return below, *undo_start(
-        Action(*kept.inner, own.ratios[0], own.overs[0], kept.a, inner),
-        Action(*kept.by_a, own.ratios[1], own.overs[1], kept.a, z[0]),
-        own.ratios[2],
+        Action(*kept.inner, own.ratio_v, own.over_v, kept.a, inner),
+        Action(*kept.by_a, own.ratio_u, own.over_u, kept.a, z),
+        own.ratio_w,
         kept.fraction,
         square,
-        start_coefficient(num_doublings),
+        d,
         y_bar,
         z_bar,
     )
+
+
+class _Doublings(NamedTuple):
+    """The quotients of a layer's doublings.
+
+    What beams see of them is formed again from the start each time, which for the few doublings
+    that there are takes less than to keep it.
+    """
+
+    start: _Step
+    kept: Callable[[Any], Doubled]
+    next_step: Callable[[_Step, Feed], tuple[_Step, Array, Array]]
+
+    def some(self, first: Any, count: int) -> list[Action]:
+        """So many in a row."""
+
+        def go(k, step):
+            return self.next_step(step, self.kept(k).right)[0]
+
+        step, found = repeated(go, first, self.start), []
+        for k in range(count):
+            part, right = self.kept(first + k)
+            step, ratio, over = self.next_step(step, right)
+            found.append(Action(*part, ratio, over, right, step.z_feed))
+        return found
+
+
+def _undoubled(
+    mean: Fields,
+    drop: Fields,
+    tau: Float[Array, "*batch"],
+    number: Any,
+    most: int | None,
+    doublings: _Doublings,
+) -> tuple[Bordered, Bordered]:
+    """P and Q of a layer's start: the last doublings undone by fields, the others by matrices."""
+    nodes = mean.nodes.shape[0]
+    assert most is not None
+    by_fields = min(most, _BY_FIELDS_OF_FEW if nodes <= _FEW_NODES else _BY_FIELDS)
+
+    def last_undone(count):
+        def undone(mean, drop):
+            quotients = doublings.some(number - count, count)[::-1] if count else []
+            heights = (tau * 0.5 ** (k + 2) for k in range(count))
+            return cotangents(mean, drop, list(zip(quotients, heights, strict=True)))
+
+        return undone
+
+    if isinstance(number, int):
+        pair = last_undone(min(number, by_fields))(mean, drop)
+    else:
+        choices = [last_undone(count) for count in range(by_fields + 1)]
+        pair = jax.lax.switch(jnp.minimum(number, by_fields), choices, mean, drop)
+    if most <= by_fields:
+        return pair
+
+    def undo(k, carry):
+        y_bar, z_bar, h = carry
+        (quotient,) = doublings.some(number - by_fields - 1 - k, 1)
+        return *undouble(quotient, h, y_bar, z_bar), 0.5 * h
+
+    h = tau * 0.5 ** (by_fields + 2)
+    y_bar, z_bar, _ = repeated(undo, number - by_fields, (*pair, h))
+    return y_bar, z_bar

@@ -35,14 +35,16 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._kernels import one_kernel, small_enough
-from .._numerics import Entry, Rows, as_array, fenced, is_entry, matmul
+from .._kernels import one_kernel
+from .._numerics import fenced, matmul
 from .adding import top
 from .bordered import Bordered
+from .doublings import Doublings
 from .fields import Fields, pair
 from .layer import ModeKernels
-from .layer_adjoint import Layer, Layers, Order, climb, descend
+from .layer_adjoint import Layer, Layers, Order, climb, descend, read
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
+from .room import Keeper, Room
 
 Kernels = tuple[ModeKernels, ModeKernels]
 
@@ -67,140 +69,75 @@ class Shared(NamedTuple):
 
 def mode_slopes(
     shared: Shared,
-    num_doublings: int,
+    doublings: Doublings,
     single_scattering: bool,
     order: Order,
     kernels: Kernels,
     ground: Bordered,
     weight: Float[Array, "*batch"],
     slopes: Shared,
-    kept: Any,
-) -> tuple[Float[Array, "*batch"], Any, Slopes]:
+    room: Room,
+) -> tuple[Float[Array, "*batch"], Room, Slopes]:
     """Reflection of a mode, and the slopes of `weight` times it, added to those of other modes.
 
-    `kept` is `room` for what is kept of all layers, given back filled: modes that share it do not
-    clear it, nor copy it, one after the other. Layers are read and written inside the kernels: as
-    inputs and outputs of a scan every array would be one more kernel a layer. Matrices lie in it as
-    one row each: LLVM unrolls a copy of 64 numbers whole, number by number, before it could make
-    vectors of it.
+    The room (`room.Keeper.empty`) is given back filled. Layers are read and written inside the
+    kernels: as inputs and outputs of a scan every array would be one more kernel a layer.
     """
     layers, view_secant = shared
     num_layers, num_nodes = layers.tau.shape[0], layers.moments.shape[1]
-    dtype = layers.tau.dtype
-    numbers = jnp.arange(num_layers, dtype=dtype)
+    numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
+    assert doublings.most is not None
+    keeper = Keeper(layers.tau, num_nodes, doublings.most)
 
     def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
         # A layer that is the only one fills the room: in the kernel XLA finds no use for its
         # number, nor for what was in the room (see `one_kernel`).
-        return function if numbers.size == 1 else one_kernel(function, num_nodes, **how)
+        return function if num_layers == 1 else one_kernel(function, num_nodes, **how)
 
-    def moved_at_once(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
-        # In a layer that is too large for one kernel, all that is only moved is one.
-        alone = numbers.size == 1 or small_enough(num_nodes, dtype, **how)
-        return function if alone else one_kernel(function, 1)
-
-    def put_on_and_keep(stack, kept, layers, number, order, kernels, view_secant):
-        layer = layers.layer(number, order.odd)
+    def put_on_and_keep(stack, room, layers, doublings, number, order, kernels, view_secant):
+        layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
         a, p = layer.matrices(order.mean, kernels, view_secant, single_scattering)
-        stack, new = climb(stack, a, p, layer.tau, num_doublings)
-        return stack, keep(kept, new, number)
-
-    @partial(moved_at_once, in_parts=True)
-    def keep(kept, new, number):
-        return jax.tree.map(partial(_in_row, number.astype(jnp.int32)), kept, new)
+        keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
+        stack, new, room = climb(stack, a, p, layer.tau, own, room, keep)
+        return stack, keeper.with_layer(room, new, number)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
 
     def up(carry, number):
-        return put_one(*carry, layers, number, order, kernels, view_secant), None
+        return put_one(*carry, layers, doublings, number, order, kernels, view_secant), None
 
-    shapes = _shapes_of_kept(num_nodes, layers.tau, num_doublings)
-    (stack, kept), _ = jax.lax.scan(up, (ground, kept), numbers, reverse=True)
+    (stack, room), _ = jax.lax.scan(up, (ground, room), numbers, reverse=True)
     reflection, fields = _fields_at_the_top(stack, weight)
 
-    def undo(fields, totals, layer, mean, kept, kernels, view_secant):
+    @compiled
+    def undo_one(carry, layers, doublings, room, number, order, kernels, view_secant):
+        fields, totals, slopes = carry
+        layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
+        kept, secants = keeper.layer(room, number), layer.secants(view_secant)
         # The beams' own entries of the stack are 1 whatever happens in it.
         fields = fields._replace(other=jnp.zeros_like(fields.other))
-        secants = layer.secants(view_secant)
-        fields, a_bar, p_bar = descend(fields, layer.tau, secants, kept, num_doublings)
+        fields, a_bar, p_bar = descend(
+            fields, layer.tau, secants, kept, own, partial(keeper.doubling, room, number)
+        )
         a, coalbedo = undo_matrix(
-            kernels[0], layer.even, secants, a_bar, single_scattering, layer.coalbedo, mean
+            kernels[0], layer.even, secants, a_bar, single_scattering, layer.coalbedo, order.mean
         )
         b = undo_inverse(kernels[1], layer.odd, kept.b_inverse, p_bar, single_scattering)
-        step = 0.5 / 2**num_doublings
-        return fields, *_collected(step, layer.tau, totals, a, b, coalbedo)
-
-    @compiled
-    def undo_one(carry, layers, kept, number, order, kernels, view_secant):
-        fields, totals, slopes = carry
-        own = entries(kept, number) if small_enough(num_nodes, dtype) else arrays(kept, number)
-        layer = layers.layer(number, order.odd)
-        fields, totals, new = undo(fields, totals, layer, order.mean, own, kernels, view_secant)
+        _, step, _ = own.of_layer()
+        totals, new = _collected(step, layer.tau, totals, a, b, coalbedo)
         return fields, totals, slopes.plus(number, order.odd, new)
 
-    def entries(kept, number):
-        place = number.astype(jnp.int32)
-        return jax.tree.map(lambda x, like: Entry(x, place, like.shape), kept, shapes)
-
-    @moved_at_once
-    def arrays(kept, number):
-        return jax.tree.map(as_array, entries(kept, number), is_leaf=is_entry)
-
     def down(carry, number):
-        return undo_one(carry, layers, kept, number, order, kernels, view_secant), None
+        return undo_one(carry, layers, doublings, room, number, order, kernels, view_secant), None
 
     start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
     carry, _ = jax.lax.scan(down, (fields, start, slopes.layers), numbers)
     fields, (even, odd, view), layers = carry
-    return reflection, kept, Slopes(Shared(layers, view), even, odd, pair(1.0, [fields]))
+    return reflection, room, Slopes(Shared(layers, view), even, odd, pair(1.0, [fields]))
 
 
-def room(like: Float[Array, "layer *batch"], num_nodes: int, num_doublings: int) -> Any:
-    """Room for what is kept of all layers, which are like these."""
-    # A number of its own in each: arrays of zeros would be one for XLA, and copied.
-    leaves, structure = jax.tree.flatten(_shapes_of_kept(num_nodes, like, num_doublings))
-    return structure.unflatten(
-        jnp.full((like.shape[0], x.size), float(k), x.dtype) for k, x in enumerate(leaves)
-    )
-
-
-def _shapes_of_kept(num_nodes: int, like: Array, num_doublings: int) -> Any:
-    """What `climb` keeps of one layer."""
-
-    def kept(like: Array) -> Any:
-        def array(*own: int) -> Array:
-            return jnp.zeros((*own, *like.shape[1:]), like.dtype)
-
-        matrix = Bordered(array(num_nodes, num_nodes), array(num_nodes, 2), array(2), array(1))
-        _, kept = climb(matrix, matrix, matrix, array(), num_doublings)
-        return jax.tree.map(_joined, kept, is_leaf=_in_blocks)
-
-    return jax.eval_shape(kept, like)
-
-
-def _in_blocks(x: Any) -> bool:
-    return isinstance(x, Rows)
-
-
-def _joined(x: Any) -> Array:
-    return x.joined() if isinstance(x, Rows) else x
-
-
-def _in_row(place: Any, rows: Array, new: Any) -> Array:
-    """The array with `new` in that row; a matrix in blocks is put together on the way."""
-    start = 0
-    for block in new.blocks if isinstance(new, Rows) else (new,):
-        rows = _put(rows, block.reshape(-1), place, start)
-        start += block.size
-    return rows
-
-
-def _put(rows, part, place, start):
-    @fenced
-    def put(rows, part, place):
-        return jax.lax.dynamic_update_slice(rows, part[None], (place, jnp.int32(start)))
-
-    return put(rows, part, place)
+def _of_layer(doublings: Doublings, number: Array) -> Doublings:
+    return jax.tree.map(lambda x: read(x, number), doublings)
 
 
 def _fields_at_the_top(stack: Bordered, weight):

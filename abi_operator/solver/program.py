@@ -22,6 +22,7 @@ from .bordered import Bordered, Vector
 from .column import Column, Options
 from .delta_m import ScaledLayers, unscaled
 from .delta_m import delta_m as scale_delta_m
+from .doublings import layer_doublings
 from .ground import black, isotropic, lambertian, reflecting
 from .legendre import legendre_series
 from .single_scatter import (
@@ -110,6 +111,15 @@ class _Problem:
             jnp.concatenate([column.mu0[None], column.mu]),
             jnp.broadcast_to(secant, column.tau.shape),
         )
+        views = jnp.broadcast_to(
+            1 / self.directions.cosines[1:, None], (column.mu.shape[0], *column.tau.shape)
+        )
+        self.doublings = layer_doublings(
+            self.layers.tau,
+            jnp.concatenate([self.directions.sun_secants[None], views]),
+            num_streams,
+            options.num_doublings,
+        )
         self.one: Vector = isotropic(num_streams, self.directions.cosines)
         self.tables = legendre_tables(num_streams, options.num_modes, self.directions.cosines)
 
@@ -145,7 +155,7 @@ class _Problem:
             grounds=others,
             weights=sign * jnp.cos(order.astype(azimuth.dtype) * azimuth),
         )
-        return mode_sum(inputs, self.options.num_doublings, not self.options.tms)[None]
+        return mode_sum(inputs, self.doublings, not self.options.tms)[None]
 
     def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:
         azimuth = self.column.relative_azimuth
@@ -155,8 +165,7 @@ class _Problem:
         return self.layers, self.tables, self.directions
 
     def _how(self) -> dict[str, Any]:
-        options = self.options
-        return {"num_doublings": options.num_doublings, "single_scattering": not options.tms}
+        return {"doublings": self.doublings, "single_scattering": not self.options.tms}
 
 
 def _grounds(albedo: Array | AnySurface, problem: _Problem) -> tuple[Bordered, Bordered | None]:

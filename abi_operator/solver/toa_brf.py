@@ -72,9 +72,10 @@ def toa_brf(
         Whether `mu`, `relative_azimuth` and `phase_function` have one more axis, the last, over
         views of the same columns; the result keeps it. Many views cost little more than one.
     num_doublings
-        Doublings of each layer (see `layer.half_layer`). None chooses from the largest layer where
-        the arguments are concrete, and enough for layers of 1e5 where they are traced. Too small a
-        number is an error that nothing reports.
+        Doublings of a layer at most (see `layer.half_layer`): each has as many as it needs up to
+        that, and too small a number is an error that nothing reports. None sets no limit; in
+        programs for slopes it is what the largest layer needs where the arguments are concrete,
+        and what one of 1e5 needs where they are traced.
     check_values
         Whether to refuse values out of range, which needs concrete arguments; see `checks`.
 

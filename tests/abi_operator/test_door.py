@@ -20,10 +20,10 @@ class Waves:
     def own_axes(self):
         return OWN_AXES
 
-    def known(self, leaves):
+    def known(self, leaves, what):
         return self
 
-    def unknown(self):
+    def unknown(self, what):
         return self
 
     def own_result(self, leaves):

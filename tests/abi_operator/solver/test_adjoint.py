@@ -18,6 +18,7 @@ from abi_operator.solver.azimuth import (
     weighted_moments,
 )
 from abi_operator.solver.delta_m import ScaledLayers
+from abi_operator.solver.doublings import layer_doublings
 from abi_operator.solver.ground import lambertian, reflecting
 
 # Both ways sum some 1e4 products, in different orders; relative to a column's largest slope.
@@ -59,11 +60,17 @@ def scaled(x):
     return ScaledLayers(x["tau"], x["ssa"], x["coalbedo"], x["moments"], x["ssa"])
 
 
-def plain(x, num_streams, general, **how):
+def doublings(x, most):
+    secants = jnp.stack([x["sun_secants"], jnp.broadcast_to(1 / x["cosines"][1], x["tau"].shape)])
+    return layer_doublings(x["tau"], secants, x["moments"].shape[1], most)
+
+
+def plain(x, num_streams, general, *, num_doublings, single_scattering):
     """Sum over the modes by the program that has no derivative of its own."""
     tables = legendre_tables(num_streams, num_streams, x["cosines"])
     shared = scaled(x), tables, Directions(x["cosines"], x["sun_secants"])
     mean, others = grounds(x, num_streams, general)
+    how = {"doublings": doublings(x, num_doublings), "single_scattering": single_scattering}
     total = azimuthal_mean(*shared, mean, **how).reflection()
     return (total + higher_modes(*shared, others, x["azimuth"][None], **how))[0]
 
@@ -88,7 +95,8 @@ def as_modes(x, num_streams, general):
 
 
 def summed(x, num_streams, general, *, num_doublings, single_scattering):
-    return mode_sum(as_modes(x, num_streams, general), num_doublings, single_scattering)
+    number = doublings(x, num_doublings)
+    return mode_sum(as_modes(x, num_streams, general), number, single_scattering)
 
 
 def value_and_slopes(function, x, *args, **how):
@@ -105,8 +113,8 @@ def _compiled(function, args, how):
     return run
 
 
-SUM = jax.jit(mode_sum, static_argnums=(1, 2))
-BOTH = jax.jit(reflectance_and_gradient, static_argnums=(1, 2))
+SUM = jax.jit(mode_sum, static_argnums=2)
+BOTH = jax.jit(reflectance_and_gradient, static_argnums=2)
 
 
 @pytest.mark.parametrize(
@@ -137,21 +145,23 @@ def test_equals_reverse_mode(num_streams, num_doublings, single_scattering, gene
 
 def test_value_and_gradient_come_together():
     """The gradient's pass up gives the value, and the gradient has the inputs' structure."""
-    inputs = as_modes(columns(2), 2, True)
-    value, gradient = BOTH(inputs, 1, False)
-    np.testing.assert_allclose(value, SUM(inputs, 1, False), rtol=AGREE)
+    x = columns(2)
+    inputs = as_modes(x, 2, True)
+    value, gradient = BOTH(inputs, doublings(x, 1), False)
+    np.testing.assert_allclose(value, SUM(inputs, doublings(x, 1), False), rtol=AGREE)
     assert jax.tree.map(jnp.shape, gradient) == jax.tree.map(jnp.shape, inputs)
 
 
 @pytest.mark.parametrize("general", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_one_mode_alone(general):
-    inputs = as_modes(columns(2), 2, general)
+    x = columns(2)
+    inputs = as_modes(x, 2, general)
     if general:
         inputs = inputs._replace(grounds=jax.tree.map(lambda x: x[:0], inputs.grounds))
     beams = tuple(table[:1] for table in inputs.beams)
     inputs = inputs._replace(beams=beams, weights=inputs.weights[:1])
-    value, gradient = BOTH(inputs, 1, True)
-    np.testing.assert_allclose(value, SUM(inputs, 1, True), rtol=AGREE)
+    value, gradient = BOTH(inputs, doublings(x, 1), True)
+    np.testing.assert_allclose(value, SUM(inputs, doublings(x, 1), True), rtol=AGREE)
     np.testing.assert_allclose(gradient.weights[0] * inputs.weights[0], value, rtol=AGREE)
 
 
@@ -186,14 +196,15 @@ def solver_arguments(count):
 
 def test_constants_cost_nothing():
     """A tangent in the thickness alone leaves no slope of the moments in the program."""
-    inputs = as_modes(columns(2), 2, True)
+    x = columns(2)
+    inputs, once = as_modes(x, 2, True), doublings(x, 1)
 
     def of_thickness(tau):
-        return mode_sum(inputs._replace(tau=tau), 1, False)
+        return mode_sum(inputs._replace(tau=tau), once, False)
 
     tangent = jnp.ones_like(inputs.tau)
     change = jax.jit(lambda tau: jax.jvp(of_thickness, (tau,), (tangent,))[1])(inputs.tau)
-    slopes = BOTH(inputs, 1, False)[1]
+    slopes = BOTH(inputs, once, False)[1]
     np.testing.assert_allclose(change, jnp.sum(slopes.tau, axis=0), rtol=AGREE)
 
 

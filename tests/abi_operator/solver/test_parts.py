@@ -11,7 +11,13 @@ from abi_operator._numerics import Entry, fenced, matmul, safe_divide, safe_sqrt
 from abi_operator.solver import double_gauss, sufficient_doublings
 from abi_operator.solver.bordered import Bordered, Vector
 from abi_operator.solver.delta_m import delta_m
-from abi_operator.solver.doublings import _REACH, unknown_doublings
+from abi_operator.solver.doublings import (
+    _REACH,
+    Doublings,
+    layer_doublings,
+    start_coefficient,
+    unknown_doublings,
+)
 from abi_operator.solver.layer import half_layer
 from abi_operator.solver.legendre import associated_legendre, legendre_series
 from abi_operator.solver.quotient import minus_and_quotient, minus_quotient
@@ -144,7 +150,7 @@ def test_kernels_read_the_same_alone_and_in_a_batch():
     rng = np.random.default_rng(1)
     batch = random_bordered(rng, batch=(5,)), random_bordered(rng, batch=(5,))
     tau = jnp.asarray(rng.uniform(0, 2, 5))
-    admittance = jax.jit(lambda *x: half_layer(*x, 2)[0].core)
+    admittance = jax.jit(lambda *x: half_layer(*x, doublings_of_a_layer(2))[0].core)
     together = admittance(*batch, tau)
     for i in range(5):
         a, b = (
@@ -218,7 +224,7 @@ def test_safe_functions_have_values_and_slopes_where_others_do_not():
 
 
 def test_more_doublings_for_thicker_layers_and_lower_sun():
-    assert sufficient_doublings(0.005, 0.5, 8) == 1
+    assert sufficient_doublings(0.005, 0.5, 8) == 4
     assert sufficient_doublings(1e5, 1e-3, 8) <= 14
     steps = [sufficient_doublings(t, 0.3, 8) for t in (0.01, 1, 30, 1e3, 1e6)]
     assert steps == sorted(steps)
@@ -227,14 +233,36 @@ def test_more_doublings_for_thicker_layers_and_lower_sun():
         assert sufficient_doublings(1e5, 1e-3, num_streams) <= 14
 
 
-@pytest.mark.parametrize("doublings", [0, 1, 2, 3, 4, 6, pytest.param(5, marks=pytest.mark.slow)])
+def test_each_layer_is_doubled_as_its_thickest_column_needs():
+    """A column that is not finite makes no others double, nor does one layer the others."""
+    smallest = double_gauss(8)[0][0]
+    tau = np.full((6, 3), 1e-9)
+    tau[:5, 1] = 2 * smallest * np.array([0.9 * _REACH[0], 1.1 * _REACH[0], 1.0, 200, 1e38])
+    tau[5] = np.nan, np.inf, 1e-9
+    secants = np.ones((2, 6, 3))
+    numbers = layer_doublings(jnp.asarray(tau), jnp.asarray(secants), 8, None).numbers
+    np.testing.assert_array_equal(numbers[:, 0], [0, 1, 4, 5, 64, 0])
+    np.testing.assert_array_equal(numbers[:, 1], 0.5 / 2 ** np.asarray(numbers[:, 0]))
+    grazing = layer_doublings(jnp.asarray(tau), jnp.asarray(secants).at[1].set(1e3), 8, None)
+    assert np.all(grazing.numbers[:5, 0] >= numbers[:5, 0]) and grazing.numbers[3, 0] == 8
+
+
+def doublings_of_a_layer(number):
+    return Doublings(jnp.asarray([number, 0.5 / 2**number, start_coefficient(number)]), number)
+
+
+HALF_LAYER = jax.jit(lambda a, p, tau, numbers: half_layer(a, p, tau, Doublings(numbers, None)))
+
+
+@pytest.mark.parametrize("doublings", range(7))
 def test_half_layer_is_tanh_up_to_the_reach_of_its_doublings(doublings):
     """One node with a = b = 1: admittance tanh(h), impedance h coth(h), h = tau / 2."""
     reach = _REACH[doublings] if doublings < 5 else _REACH[4] * 4 ** (doublings - 4)
     tau = jnp.asarray(2 * reach * np.linspace(1e-3, 1, 50))
     ones = jnp.ones((1, 1, 50))
     unit = Bordered(ones, 0 * jnp.ones((1, 2, 50)), jnp.ones((2, 50)), jnp.zeros((1, 50)))
-    admittance, impedance = jax.jit(half_layer, static_argnums=3)(unit, unit, tau, doublings)
+    numbers = doublings_of_a_layer(doublings).numbers
+    admittance, impedance = HALF_LAYER(unit, unit, tau, numbers)
     h = np.asarray(tau) / 2
     for found, exact in ((admittance, np.tanh(h)), (impedance, h / np.tanh(h))):
         np.testing.assert_allclose(found.core[0, 0], exact, rtol=REACH_ERROR)
