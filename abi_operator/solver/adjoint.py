@@ -19,7 +19,7 @@ from .bordered import Bordered
 from .doublings import Doublings
 from .ground import black
 from .layer import half_layer, node_functions
-from .layer_adjoint import Layers, Order, read
+from .mode_layers import Layers, Order, read
 from .mode_slopes import Kernels, Shared, mode_slopes
 from .room import Keeper
 

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 
 from .._batching import on_every_device
 from .doublings import sufficient_doublings
@@ -143,11 +142,8 @@ def names(structure: Any) -> tuple[str, ...]:
     return tuple(name for name, _ in _leaves(places))
 
 
-def choose_doublings(column: Column, num_streams: int) -> int | None:
-    """Smallest sufficient number for concrete layers and beams; None where they are traced."""
-    read = column.tau, column.mu, column.mu0 if column.secant is None else column.secant
-    if any(isinstance(x, Tracer) for x in read):
-        return None
+def choose_doublings(column: Column, num_streams: int) -> int:
+    """Smallest number offered that suffices for the largest of concrete layers."""
     sun = column.mu0 if column.secant is None else 1 / np.asarray(column.secant)
     beams = [np.asarray(column.mu), np.asarray(sun)]
     if column.tau.size == 0:

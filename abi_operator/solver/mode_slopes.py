@@ -42,7 +42,8 @@ from .bordered import Bordered
 from .doublings import Doublings
 from .fields import Fields, pair
 from .layer import ModeKernels
-from .layer_adjoint import Layer, Layers, Order, climb, descend, read
+from .layer_adjoint import climb, descend
+from .mode_layers import Layer, Layers, Order, read
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 from .room import Keeper, Room
 
