@@ -87,7 +87,7 @@ def values(
     num_axes
         Axes of the batch.
     num_doublings
-        Doublings of every layer; None for as many as each needs.
+        Doublings of a layer, at most; None for as many as each needs.
     """
 
     def value(tile: Leaves) -> Array:

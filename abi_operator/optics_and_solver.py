@@ -42,7 +42,7 @@ def solve(
     inputs, options
         What the columns are and how to solve them.
     num_doublings
-        Doublings of every layer; None for a sufficient number.
+        Doublings of a layer, at most; None sets no limit to values (see above).
     """
     leaves, structure = jax.tree.flatten(inputs)
     num_axes = inputs.state.geometry.solar_zenith.ndim

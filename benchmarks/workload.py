@@ -84,7 +84,7 @@ def henyey_greenstein(asymmetry, cosine):
 
 
 def num_doublings(num_streams):
-    """For layers up to tau = 3 and one of 30, right to 1e-5; see `layer.start_coefficient`."""
+    """For layers up to tau = 3 and one of 30, right to 1e-5; see `doublings.start_coefficient`."""
     return 2 if num_streams <= 8 else 3
 
 

@@ -32,7 +32,7 @@ from abi_operator.optics.mie_table import mie_table
 SEED = 20050828
 EACH = 26  # columns of each kind
 STREAMS = 8
-# Enough for any layer here. To have them chosen would compile the optics twice.
+# Enough for any layer here.
 DOUBLINGS = 10
 FLOOR = 1e-3  # BRF below which differences are absolute
 # Nearly all columns agree to 1e-10. What remains is CDISORT's, which ends a column at an absorption

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from cdisort import cdisort_brf
 from columns import STANDARD, simple_columns, standard_columns
+from programs import programs_anew
 
-from abi_operator.solver import toa_brf
+from abi_operator.solver import doublings, toa_brf
 
 # A few hundred products and inverses of well-conditioned matrices.
 ROUNDING = 1e-12
@@ -107,15 +108,21 @@ def test_leading_axes_broadcast():
     np.testing.assert_allclose(grid[1], one, rtol=1e-13)
 
 
-def test_doublings_chosen_from_the_data_equal_more_of_them():
-    """More are chosen for thick neighbours, and where the data are traced."""
+def test_doublings_chosen_from_the_data_equal_more_of_them(monkeypatch):
+    """Each layer has more beside thick neighbours, and if it is thought to reach less far."""
     columns = standard_columns()
     options = {"num_streams": 2, "num_doublings": None}
     chosen = brf(columns, **options)
     traced = jax.jit(lambda *a: toa_brf(*a, num_streams=2))(*columns)
     np.testing.assert_allclose(chosen, traced, rtol=1e-10)
-    columns[0][2:] = 1e4
-    np.testing.assert_allclose(brf(columns, **options)[:2], chosen[:2], rtol=SPLIT)
+    thick = [columns[0].copy(), *columns[1:]]
+    thick[0][2:] = 1e4
+    np.testing.assert_allclose(brf(thick, **options)[:2], chosen[:2], rtol=SPLIT)
+    programs_anew(monkeypatch)
+    monkeypatch.setattr(doublings, "_reach", lambda k, reach=doublings._reach: reach(k) / 4**4)
+    more = brf(columns, **options)
+    assert np.any(more != chosen)
+    np.testing.assert_allclose(more, chosen, rtol=SPLIT)
 
 
 def test_lists_are_arrays():
