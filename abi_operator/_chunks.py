@@ -7,7 +7,7 @@ and for no other number of columns, whatever comes; and nothing has to be set be
 The last chunk of a size begins where it must to end with the last column: some columns are solved
 twice, but none is copied. Fewer columns than the smallest chunk has are filled up with copies.
 
-Chunks are compiled for the processor's widest vectors, unless ``XLA_FLAGS`` says how wide they are.
+How they are compiled is settled in `_compiler`.
 """
 
 import math
@@ -21,19 +21,10 @@ import jax
 import numpy as np
 from jaxtyping import Array
 
-from ._processor import usable_cores, vector_bits
-
-_WIDTH_FLAG = "xla_cpu_prefer_vector_width"
+from ._processor import usable_cores
 
 # What has been compiled: of several threads with a new program each would compile it.
 _compiled: set[Any] = set()
-
-
-def compiler_options() -> dict[str, int] | None:
-    """Options of `jax.jit` for the widest vectors, where the user has not chosen them."""
-    bits = vector_bits()
-    chosen = _WIDTH_FLAG in os.environ.get("XLA_FLAGS", "")
-    return None if bits is None or chosen else {_WIDTH_FLAG: bits}
 
 
 def can_be_cut(arrays: Sequence[Any]) -> bool:

@@ -26,8 +26,9 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Float
 
+from . import _compiler
 from ._batching import announced
-from ._chunks import can_be_cut, compiler_options, map_chunks
+from ._chunks import can_be_cut, map_chunks
 
 Leaves = Sequence[Any]
 
@@ -257,7 +258,7 @@ def _jitted(what: Any, alone: bool) -> Any:
             return program.value(leaves)
         return program.value_and_slopes(leaves, what)
 
-    return jax.jit(call, static_argnums=0, compiler_options=compiler_options() if alone else None)
+    return jax.jit(call, static_argnums=0, compiler_options=_compiler.options() if alone else None)
 
 
 def slopes_by_reverse_mode(

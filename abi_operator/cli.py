@@ -32,7 +32,7 @@ from .optics import ALL_GASES
 from .satellites import SATELLITES
 from .scene import CLASSES
 from .simulation import Report, Request, Species, open_scene, simulate_scene
-from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_widest_vectors
+from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_compiler_flags
 from .surface import EMISSIVITY_3900NM
 
 COMMANDS = "abi_operator.commands"
@@ -244,7 +244,7 @@ def _prepare_process(keep_programs: bool) -> None:
     # Tracing makes many small objects that stay; a tenth of it is a search for some that do not.
     gc.freeze()
     gc.set_threshold(50_000)
-    use_widest_vectors()
+    use_compiler_flags()
     if not keep_programs:
         jax.config.update("jax_enable_compilation_cache", False)
     with _user_warnings():

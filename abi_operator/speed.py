@@ -3,14 +3,14 @@
 Whatever is called with values (``reflectance_factor(state)``, ``toa_brf(tau, ...)``, `jax.jacrev`
 of either) is cut among all cores and compiled for the widest vectors by itself. A `jax.jit` of
 one's own is one program, which XLA runs on one core for each CPU device that JAX has, with vectors
-as wide as LLVM likes them: `use_full_speed` settles both before JAX starts.
+as wide as LLVM likes them, and is compiled for half as long again: `use_full_speed` settles all
+three before JAX starts.
 
 `use_compilation_cache` keeps what is compiled, for the next process; the command line does so by
 itself. Importing this package sets nothing, and neither function changes what the user has set.
 """
 
 import os
-import re
 import tempfile
 import warnings
 from pathlib import Path
@@ -19,10 +19,11 @@ from typing import NamedTuple
 import jax
 from jax.experimental.compilation_cache.compilation_cache import reset_cache
 
+from . import _compiler
 from ._processor import processor_key, vector_bits
 from ._processor import usable_cores as usable_cores
 
-_DEVICES, _VECTORS = "xla_force_host_platform_device_count", "xla_cpu_prefer_vector_width"
+_DEVICES = "xla_force_host_platform_device_count"
 
 # Bytes of compiled programs that are kept. A demonstration leaves 3 MB, of 60 programs.
 _KEPT = 512 * 2**20
@@ -57,9 +58,10 @@ def use_full_speed() -> Speed:
 
     To be called before JAX is first used: right after the imports. It gives JAX one CPU device for
     each usable core (``jax_num_cpu_devices``), among which columns are shared under any `jax.jit`,
-    and adds ``--xla_cpu_prefer_vector_width`` to ``XLA_FLAGS``, which child processes inherit,
-    where the processor has wider vectors than LLVM uses. A number of devices or a width that the
-    user has set, in the environment or in `jax.config`, stays.
+    and adds to ``XLA_FLAGS``, which child processes inherit, how to compile: for the processor's
+    widest vectors where LLVM would not use them (``--xla_cpu_prefer_vector_width``), and sooner
+    (``--xla_backend_extra_options``). What the user has set, in the environment or in `jax.config`,
+    stays.
 
     Where JAX has been used already nothing can be changed: that is a warning, as all results are
     the same without, unless nothing is missing (a second call).
@@ -68,12 +70,12 @@ def use_full_speed() -> Speed:
     -------
     What is in force; printed, it is a sentence.
     """
-    cores, bits = _chosen_cores(), _chosen_bits()
+    cores, bits = _chosen_cores(), _compiler.chosen_bits()
     if not _jax_has_started():
         if cores is None:
             cores = usable_cores()
             jax.config.update("jax_num_cpu_devices", cores)
-        return Speed(cores, use_widest_vectors())
+        return Speed(cores, use_compiler_flags())
     found = Speed(_cpu_devices(), bits)
     missing = cores is None and found.cores < usable_cores()
     missing |= bits is None and vector_bits() is not None
@@ -86,19 +88,16 @@ def use_full_speed() -> Speed:
     return found
 
 
-def use_widest_vectors() -> int | None:
-    """Let XLA use the processor's widest vectors in all programs; nothing where JAX has started.
+def use_compiler_flags() -> int | None:
+    """Let XLA compile all programs as this package does; nothing where JAX has started.
 
     Returns
     -------
-    Width that XLA is told to use; None where it chooses. [bit]
+    Width of vectors that XLA is told to use; None where it chooses. [bit]
     """
-    bits = _chosen_bits()
-    if bits is None and vector_bits() is not None and not _jax_has_started():
-        bits = vector_bits()
-        flags = os.environ.get("XLA_FLAGS", "")
-        os.environ["XLA_FLAGS"] = f"{flags} --{_VECTORS}={bits}".strip()
-    return bits
+    if not _jax_has_started():
+        _compiler.use_flags()
+    return _compiler.chosen_bits()
 
 
 def use_compilation_cache(folder: str | os.PathLike[str] | None = None) -> Path | None:
@@ -158,18 +157,7 @@ def default_cache_folder() -> Path:
 def _chosen_cores() -> int | None:
     """CPU devices that somebody, perhaps this module, has asked for."""
     number = jax.config.jax_num_cpu_devices  # pyright: ignore[reportAttributeAccessIssue]
-    return number if number >= 0 else _flag(_DEVICES)
-
-
-def _chosen_bits() -> int | None:
-    """Width of vectors that somebody, perhaps this module, has asked for."""
-    return _flag(_VECTORS)
-
-
-def _flag(name: str) -> int | None:
-    """Number that ``XLA_FLAGS`` gives an option; of several, XLA takes the last."""
-    found = re.findall(rf"--{name}=(\d+)", os.environ.get("XLA_FLAGS", ""))
-    return int(found[-1]) if found else None
+    return number if number >= 0 else _compiler.number_of(_DEVICES)
 
 
 def _jax_has_started() -> bool:

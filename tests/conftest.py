@@ -14,16 +14,17 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 # What one worker compiled the others read, and the processes that tests start. [s]
 _CACHE, _SHORTEST_COMPILATION = "JAX_COMPILATION_CACHE_DIR", 0.0
 
-# Short loops stay loops: they compute the same and are compiled in three quarters of the time.
+# As the commands have it (`abi_operator._compiler`, which must not be imported here: what is
+# imported before pytest is ready is not checked for shapes).
 _EXTRA = "--xla_backend_extra_options"
-_LOOPS = f"{_EXTRA}=xla_cpu_disable_loop_unrolling=true"
+_LEAN = f"{_EXTRA}=xla_cpu_disable_new_fusion_emitters=true,xla_cpu_disable_loop_unrolling=true"
 
 
 def pytest_configure(config):
     """One cache of compiled programs for all workers of a run, emptied at its end."""
     flags = os.environ.get("XLA_FLAGS", "")
     if _EXTRA not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} {_LOOPS}".strip()
+        os.environ["XLA_FLAGS"] = f"{flags} {_LEAN}".strip()
     if _CACHE not in os.environ:
         config.own_cache = tempfile.mkdtemp(prefix="abi-operator-tests-")
         os.environ[_CACHE] = config.own_cache

@@ -270,7 +270,8 @@ try:
 except SystemExit as end:
     assert end.code == 2
 bits = _processor.vector_bits()
-assert bits is None or os.environ["XLA_FLAGS"] == f"--xla_cpu_prefer_vector_width={bits}"
+assert bits is None or f"--xla_cpu_prefer_vector_width={bits} " in os.environ["XLA_FLAGS"]
+assert "--xla_backend_extra_options=" in os.environ["XLA_FLAGS"]
 assert jax.config.jax_num_cpu_devices == -1
 print(jax.config.jax_compilation_cache_dir)
 """

@@ -24,8 +24,10 @@ assert jax.config.jax_compilation_cache_dir is None
 found = abi_operator.use_full_speed()
 assert found == (usable_cores(), vector_bits()), found
 assert jax.local_device_count() == usable_cores()
+flags = os.environ["XLA_FLAGS"].split()
 if vector_bits() is not None:
-    assert os.environ["XLA_FLAGS"] == f"--xla_cpu_prefer_vector_width={vector_bits()}"
+    assert flags.pop(0) == f"--xla_cpu_prefer_vector_width={vector_bits()}"
+assert [flag.partition("=")[0] for flag in flags] == ["--xla_backend_extra_options"]
 warnings.simplefilter("error")
 assert abi_operator.use_full_speed() == found
 print(found)
@@ -97,13 +99,12 @@ def finish(*children, quiet=True):
 
 
 def test_full_speed_is_what_nobody_has_chosen_otherwise():
-    flags = "--xla_force_host_platform_device_count=3 --xla_cpu_prefer_vector_width=256"
-    by_flags = start(USERS_CHOICE, XLA_FLAGS=flags)
+    flags = "--xla_cpu_prefer_vector_width=256 --xla_backend_extra_options=one=two"
+    with_devices = f"{flags} --xla_force_host_platform_device_count=3"
+    by_flags = start(USERS_CHOICE, XLA_FLAGS=with_devices)
     (sentence,) = finish(start(FULL_SPEED))
     assert sentence.startswith("Programs under jax.jit run on ") and sentence.endswith(".\n")
-    by_name = start(
-        USERS_CHOICE, XLA_FLAGS="--xla_cpu_prefer_vector_width=256", JAX_NUM_CPU_DEVICES="3"
-    )
+    by_name = start(USERS_CHOICE, XLA_FLAGS=flags, JAX_NUM_CPU_DEVICES="3")
     finish(by_flags, by_name)
 
 
