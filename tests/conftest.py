@@ -1,5 +1,6 @@
 """Precision and strictness under which every test runs."""
 
+import gc
 import os
 import shutil
 import tempfile
@@ -10,6 +11,10 @@ import pytest
 if "JAX_ENABLE_X64" not in os.environ:
     jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+# As in the commands: a twentieth of all time is a search for what tracing might leave behind.
+gc.freeze()
+gc.set_threshold(50_000)
 
 # What one worker compiled the others read, and the processes that tests start. [s]
 _CACHE, _SHORTEST_COMPILATION = "JAX_COMPILATION_CACHE_DIR", 0.0

@@ -22,6 +22,7 @@ FLOORS = [
     {"geometry", "planck"},
     {"satellites", "_door", "_elimination"},
     {"_chunks", "speed"},
+    {"_compiler"},
     {
         "_batching",
         "_kernels",

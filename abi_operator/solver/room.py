@@ -7,7 +7,7 @@ after the other.
 """
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import jax
@@ -46,7 +46,7 @@ class Keeper:
 
     def __init__(self, tau: Float[Array, "layer *batch"], num_nodes: int, most: int):
         self.num_layers, self.num_nodes, self.most = tau.shape[0], num_nodes, most
-        self.dtype, self.shapes = tau.dtype, _shapes(num_nodes, tau)
+        self.dtype, self.shapes = tau.dtype, _shapes(num_nodes, tau.shape[1:], tau.dtype)
 
     def empty(self) -> Room:
         """Room with nothing of use in it."""
@@ -105,19 +105,20 @@ def _empty(shapes: Any, count: int, first: int) -> Any:
     )
 
 
-def _shapes(num_nodes: int, like: Array) -> Room:
-    """What `climb` keeps of one layer, and of each doubling."""
+@cache
+def _shapes(num_nodes: int, batch: tuple[int, ...], dtype: Any) -> Room:
+    """What `climb` keeps of one layer, and of each doubling; traced for it once."""
 
-    def kept(like: Array) -> Room:
+    def kept() -> Room:
         def array(*own: int) -> Array:
-            return jnp.zeros((*own, *like.shape[1:]), like.dtype)
+            return jnp.zeros((*own, *batch), dtype)
 
         matrix = Bordered(array(num_nodes, num_nodes), array(num_nodes, 2), array(2), array(1))
         once = Doublings(None, 1)
         _, *kept = climb(matrix, matrix, matrix, array(), once, None, lambda _, new, k: new)
         return Room(*jax.tree.map(_joined, kept, is_leaf=_in_blocks))
 
-    return jax.eval_shape(kept, like)
+    return jax.eval_shape(kept)
 
 
 def _in_blocks(x: Any) -> bool:

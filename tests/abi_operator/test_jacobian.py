@@ -27,8 +27,8 @@ from abi_operator import (
 )
 from abi_operator.surface import RossLi, ocean
 
-# The bands of the quick test: sunlight over a sea, and emission with it over land.
-FEW = ("C01", "C07")
+# The band of the quick test: sunlight, and emission with it, over land.
+FEW = ("C07",)
 # Rounding, relative to the largest entry of a leaf in any band.
 MODES_AGREE = 1e-8
 # Of Richardson's differences, whose own error is of the fourth order in the step.
@@ -59,7 +59,8 @@ def rich_state(bands=FEW, num_layers=3):
         hydrometeors={"rain": Hydrometeor(rain, 1e6 * rain), "snow": Hydrometeor(snow, 1e7 * snow)},
     )
     grounds = {band: 0.2 for band in bands}
-    grounds["C01"] = ocean(jnp.asarray(5.0), "C01")
+    if "C06" in bands:
+        grounds["C06"] = ocean(jnp.asarray(5.0), "C06")
     grounds["C07"] = RossLi(*map(jnp.asarray, (0.3, 0.1, 0.02)))
     state = State(
         air,

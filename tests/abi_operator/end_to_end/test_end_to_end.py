@@ -1,8 +1,9 @@
 """The operator against CDISORT on layers that none of its optics has made.
 
-208 specified columns of eight kinds, in all seven bands. On one side a `State` and one call; on the
-other layers built in NumPy from published equations and numbers (``tests/independent_*.py``), one
-run of CDISORT for each exponential term, and the weighted sum of the runs.
+Specified columns of eight kinds, in all seven bands; 208 of them behind ``-m slow``. On one side a
+`State` and one call; on the other layers built in NumPy from published equations and numbers
+(``tests/independent_*.py``), one run of CDISORT for each exponential term, and the weighted sum of
+the runs.
 """
 
 from functools import partial
@@ -30,7 +31,7 @@ from abi_operator.optics import column_optics
 from abi_operator.optics.mie_table import mie_table
 
 SEED = 20050828
-EACH = 26  # columns of each kind
+FEW, MANY = 6, 26  # columns of each kind
 STREAMS = 8
 # Enough for any layer here.
 DOUBLINGS = 10
@@ -44,9 +45,10 @@ MIE_TABLES = 1e-4
 EMITTING = ("C05", "C06", "C07")
 
 
-@pytest.fixture(scope="module")
-def columns():
-    return independent_columns.specified_columns(EACH, SEED)
+@pytest.fixture(scope="module", params=[FEW, pytest.param(MANY, marks=pytest.mark.slow)])
+def columns(request):
+    each = max(FEW, round(request.param * request.config.getoption("--scale")))
+    return independent_columns.specified_columns(each, SEED)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +80,7 @@ def test_reflectances_of_seven_bands(columns, reflected):
         [independent.cdisort_sum(c, b, independent.layers(c, b), STREAMS) for b in BANDS]
         for c in columns
     ]
-    assert reflected.shape == (len(KINDS) * EACH, len(BANDS)) and reflected.shape[0] >= 200
+    assert reflected.shape == (len(columns), len(BANDS))
     assert_equal(reflected, np.array(reference), columns, BANDS)
 
 
@@ -155,9 +157,10 @@ def test_plumes_of_spheres_straight_from_mie_theory(columns, reflected):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("columns", [FEW], indirect=True)
 def test_sixteen_streams(columns):
     """Two columns of each kind, in a band of air and plumes and one of vapour and ice."""
-    few, bands = columns[:: EACH // 2], ("C01", "C05")
+    few, bands = columns[:: FEW // 2], ("C01", "C05")
     ours = brf(
         independent_columns.states(few, "mie"), bands, num_streams=16, num_doublings=DOUBLINGS
     )

@@ -120,8 +120,9 @@ BOTH = jax.jit(reflectance_and_gradient, static_argnums=2)
 @pytest.mark.parametrize(
     ("num_streams", "num_doublings", "single_scattering", "general"),
     [
-        (2, 0, True, True),
-        (2, 1, False, False),
+        (2, 1, True, True),
+        pytest.param(2, 0, True, True, marks=pytest.mark.slow),
+        pytest.param(2, 1, False, False, marks=pytest.mark.slow),
         pytest.param(4, 3, False, False, marks=pytest.mark.slow),
         pytest.param(4, 3, True, True, marks=pytest.mark.slow),
         pytest.param(6, 3, False, False, marks=pytest.mark.slow),
@@ -243,11 +244,11 @@ def test_second_derivatives(order):
 
 def test_single_precision():
     """Finite everywhere, empty layers included, and as accurate as the type allows."""
-    how = {"num_doublings": 1, "single_scattering": False}
-    x = columns(4)
-    _, expected = value_and_slopes(summed, x, 4, False, **how)
+    how = {"num_doublings": 1, "single_scattering": True}
+    x = columns(2)
+    _, expected = value_and_slopes(summed, x, 2, True, **how)
     single = {name: value.astype(jnp.float32) for name, value in x.items()}
-    value, slopes = value_and_slopes(summed, single, 4, False, **how)
+    value, slopes = value_and_slopes(summed, single, 2, True, **how)
     assert value.dtype == jnp.float32
     for name, slope in slopes.items():
         assert slope.dtype == jnp.float32
