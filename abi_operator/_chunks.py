@@ -10,10 +10,12 @@ twice, but none is copied. Fewer columns than the smallest chunk has are filled 
 How they are compiled is settled in `_compiler`.
 """
 
+import gc
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -82,22 +84,22 @@ def map_chunks(
         some: list[Any] = [x[place] if each else x for x, each in zip(host, own, strict=True)]
         # Settings of the caller's thread, not of this one.
         with jax.enable_x64(x64), jax.default_device(device):
-            return jax.block_until_ready(function(some))
-
-    # Never in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives, would
-    # be part of what JAX knows a compiled program by.
-    threads = _threads(os.getpid())
-    if len(chunks) == 1:
-        (chunk,) = chunks
-        found = {chunk: threads.submit(solve, *chunk).result()}
-        return found[chunk] if batch == (chunk[1],) else _joined(found, batch)
+            if known(width):
+                return jax.block_until_ready(function(some))
+            with _no_search_for_garbage():
+                return jax.block_until_ready(function(some))
 
     def known(width: int) -> bool:
         return (key, shapes, width, x64) in _compiled
 
-    new = [c for c in _first_of_each(chunks) if not known(c[1])]
+    # Never in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives, would
+    # be part of what JAX knows a compiled program by.
+    threads = _threads(os.getpid())
+    new = [c for c in _first_of_each(chunks) if len(chunks) == 1 or not known(c[1])]
     found = {c: threads.submit(solve, *c).result() for c in new}
     _compiled.update((key, shapes, width, x64) for _, width in chunks)
+    if len(chunks) == 1 and batch == (chunks[0][1],):
+        return found[chunks[0]]
     rest = [c for c in chunks if c not in found]
     found |= zip(rest, threads.map(lambda c: solve(*c), rest), strict=True)
     return _joined(found, batch)
@@ -133,6 +135,18 @@ def _evenly(start: int, count: int, width: int) -> list[tuple[int, int]]:
 
 def _first_of_each(chunks: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return list({width: (start, width) for start, width in reversed(chunks)}.values())
+
+
+@contextmanager
+def _no_search_for_garbage() -> Iterator[None]:
+    """Tracing makes many small objects that stay: a tenth of it is to search for others."""
+    searching = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if searching:
+            gc.enable()
 
 
 @cache

@@ -9,6 +9,7 @@ are of sunlight alone: what the ground and the air emit in C07 is not in them.
 
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -72,7 +73,8 @@ def brf(
     state, _ = uniform(state)
     if is_concrete(state):
         check_state(state)
-    return _lit(state, solve(Inputs(state, {}), options, num_doublings), jnp.nan)
+    value = solve(Inputs(state, {}), options, num_doublings)
+    return _lit(value, state.geometry.solar_zenith, state.geometry.view_zenith)
 
 
 def reflectance_factor(
@@ -98,18 +100,23 @@ def reflectance_factor(
         num_modes=num_modes,
         num_doublings=num_doublings,
     )
-    mu0, mu = (
-        jnp.cos(jnp.asarray(x, value.dtype))[..., None]
-        for x in (state.geometry.solar_zenith, state.geometry.view_zenith)
-    )
+    return _with_the_suns_cosine(value, state.geometry.solar_zenith, state.geometry.view_zenith)
+
+
+# One program each: operation by operation, forward and backward, they were thirty.
+
+
+@jax.jit
+def _with_the_suns_cosine(value: Array, solar_zenith: Array, view_zenith: Array) -> Array:
+    mu0, mu = (jnp.cos(jnp.asarray(x, value.dtype))[..., None] for x in (solar_zenith, view_zenith))
     # Where brf is NaN its derivative in mu0 would be too.
     lit = (mu0 > 0) & (mu > 0)
     by_day = jnp.where(lit, mu0, 0) * jnp.where(lit, value, 0)
     return jnp.where(mu > 0, by_day, jnp.nan)
 
 
-def _lit(state: State, value: Array, otherwise: float) -> Array:
-    """`value` where the sun is up and the satellite in sight."""
-    geometry = state.geometry
-    up = (jnp.cos(geometry.solar_zenith) > 0) & (jnp.cos(geometry.view_zenith) > 0)
-    return jnp.where(up[..., None], value, otherwise)
+@jax.jit
+def _lit(value: Array, solar_zenith: Array, view_zenith: Array) -> Array:
+    """`value` where the sun is up and the satellite in sight, else NaN."""
+    up = (jnp.cos(solar_zenith) > 0) & (jnp.cos(view_zenith) > 0)
+    return jnp.where(up[..., None], value, jnp.nan)

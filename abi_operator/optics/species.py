@@ -4,13 +4,13 @@ Every number of the published optics can be replaced.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jax.typing import ArrayLike
-from jaxtyping import Array
 
 from ..atmosphere import MiePlume, Plume
 from ..bands import GRASSO2013, check_bands
@@ -178,19 +178,26 @@ def _broadcast(plume: dict) -> dict:
     return jax.tree.unflatten(structure, arrays)
 
 
-def _check(species: str, name: str, requirement: str, holds: Array) -> None:
+def _read(plume: dict) -> dict:
+    """The same as NumPy's arrays where they can be read, with which no comparison is compiled."""
+    return jax.tree.map(lambda x: x if isinstance(x, Tracer) else np.asarray(x), plume)
+
+
+def _check(species: str, name: str, requirement: str, holds: Any) -> None:
     """Raise `ValueError` naming a quantity that is out of range, unless it is traced."""
     if not isinstance(holds, Tracer) and not np.all(holds):
         raise ValueError(f"{name} of {species} must be {requirement}.")
 
 
 def _check_extent(species: str, plume: dict) -> None:
+    plume = _read(plume)
     _check(species, "top", "above base", plume["top"] > plume["base"])
     _check(species, "aod_550", "0 or more", plume["aod_550"] >= 0)
     _check(species, "brightness", "0 or more", plume["brightness"] >= 0)
 
 
 def _check_optics(species: str, plume: dict) -> None:
+    plume = _read(plume)
     for band, extinction in plume["relative_extinction"].items():
         _check(species, f"relative_extinction[{band!r}]", "0 or more", extinction >= 0)
     for band, ssa in plume["ssa"].items():

@@ -19,7 +19,7 @@ from .quotient import Quotient, minus_and_quotient
 _BY_FIELDS, _BY_FIELDS_OF_FEW, _FEW_NODES = 2, 1, 2
 
 
-class _Part(NamedTuple):
+class Part(NamedTuple):
     """A quotient's core and border: in blocks of rows on the way up, as arrays on the way down."""
 
     core: Any
@@ -32,15 +32,15 @@ class Kept(NamedTuple):
     b_inverse: Bordered
     a: Feed
     fraction: Feed
-    inner: _Part
-    by_a: _Part
+    inner: Part
+    by_a: Part
     adding: Action
 
 
 class Doubled(NamedTuple):
     """What the way down needs of a doubling, of Y before it; the rest is formed again."""
 
-    quotient: _Part
+    quotient: Part
     right: Feed
 
 
@@ -86,8 +86,8 @@ def climb(
     return stack, kept, room
 
 
-def _part(quotient: Quotient) -> _Part:
-    return _Part(quotient.core, quotient.border)
+def _part(quotient: Quotient) -> Part:
+    return Part(quotient.core, quotient.border)
 
 
 class _Beams(NamedTuple):

@@ -7,7 +7,7 @@ after the other.
 """
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -17,8 +17,8 @@ from jaxtyping import Array, Float
 from .._kernels import one_kernel, small_enough
 from .._numerics import Entry, Rows, as_array, fenced, is_entry
 from .bordered import Bordered
-from .doublings import Doublings
-from .layer_adjoint import climb
+from .fields import Action, Feed
+from .layer_adjoint import Doubled, Kept, Part
 
 
 class Room(NamedTuple):
@@ -46,7 +46,7 @@ class Keeper:
 
     def __init__(self, tau: Float[Array, "layer *batch"], num_nodes: int, most: int):
         self.num_layers, self.num_nodes, self.most = tau.shape[0], num_nodes, most
-        self.dtype, self.shapes = tau.dtype, _shapes(num_nodes, tau.shape[1:], tau.dtype)
+        self.dtype, self.shapes = tau.dtype, _shapes(num_nodes, tau)
 
     def empty(self) -> Room:
         """Room with nothing of use in it."""
@@ -105,28 +105,21 @@ def _empty(shapes: Any, count: int, first: int) -> Any:
     )
 
 
-@cache
-def _shapes(num_nodes: int, batch: tuple[int, ...], dtype: Any) -> Room:
-    """What `climb` keeps of one layer, and of each doubling; traced for it once."""
+def _shapes(num_nodes: int, like: Float[Array, "layer *batch"]) -> Room:
+    """What `climb` keeps of one layer, and of each doubling."""
 
     def kept() -> Room:
         def array(*own: int) -> Array:
-            return jnp.zeros((*own, *batch), dtype)
+            return jnp.zeros((*own, *like.shape[1:]), like.dtype)
 
-        matrix = Bordered(array(num_nodes, num_nodes), array(num_nodes, 2), array(2), array(1))
-        once = Doublings(None, 1)
-        _, *kept = climb(matrix, matrix, matrix, array(), once, None, lambda _, new, k: new)
-        return Room(*jax.tree.map(_joined, kept, is_leaf=_in_blocks))
+        core, border = array(num_nodes, num_nodes), array(num_nodes, 2)
+        beams, corner = array(2), array(1)
+        part, feed = Part(core, border), Feed(border, corner)
+        adding = Action(core, border, beams, beams, feed, feed)
+        own = Bordered(core, border, beams, corner)
+        return Room(Kept(own, feed, feed, part, part, adding), Doubled(part, feed))
 
     return jax.eval_shape(kept)
-
-
-def _in_blocks(x: Any) -> bool:
-    return isinstance(x, Rows)
-
-
-def _joined(x: Any) -> Array:
-    return x.joined() if isinstance(x, Rows) else x
 
 
 def _in_row(place: Any, rows: Array, new: Any) -> Array:
