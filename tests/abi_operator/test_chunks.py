@@ -97,7 +97,7 @@ MOST = 600
 inside_jit = jax.jit(jax.value_and_grad(total, argnums=PLACES))
 
 
-@pytest.mark.parametrize("size", [5, 100, MOST])
+@pytest.mark.parametrize("size", [5, pytest.param(100, marks=pytest.mark.slow), MOST])
 def test_values_and_slopes_are_those_inside_jit(size):
     every = [jnp.asarray(x) for x in arguments(MOST)]
     columns = [x[:size] if x.ndim else x for x in every]

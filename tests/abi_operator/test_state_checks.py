@@ -23,13 +23,15 @@ from abi_operator import (
 from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.surface import Lambertian, RossLi
 
-OPTIONS = {"num_streams": 2, "num_modes": 1, "num_doublings": 0}
-BANDS = ("C01", "C06")
+# As in `test_reflectance`, for its programs.
+OPTIONS = {"num_streams": 4, "num_doublings": 5}
+BANDS = ("C06", "C01")
+LAYERS = 12
 
 
 def batch_of(count=3):
-    """Equal columns of a few layers."""
-    state = column(num_layers=4)
+    """Equal columns."""
+    state = column(num_layers=LAYERS)
     return jax.tree.map(lambda x: np.stack([np.asarray(x, float)] * count), state)
 
 
@@ -125,7 +127,7 @@ def test_night_and_out_of_sight():
 
 def test_flags_of_angles_particles_and_grounds():
     state = batch_of(6)
-    tiny = np.zeros((6, 4))
+    tiny = np.zeros((6, LAYERS))
     tiny[3, 1] = 1e-3
     snow = Hydrometeor(tiny, 1e16 * tiny)  # crystals far below 20 um
     state = eqx.tree_at(
@@ -152,7 +154,7 @@ def test_flags_of_angles_particles_and_grounds():
         "ground_above_one",
     ]
     expected = [QUALITY_FLAGS.get(name, 0) for name in names]
-    liquid = eqx.tree_at(lambda s: s.atmosphere.liquid.mass_path, state, np.zeros((6, 4)))
+    liquid = eqx.tree_at(lambda s: s.atmosphere.liquid.mass_path, state, np.zeros((6, LAYERS)))
     liquid = eqx.tree_at(
         lambda s: [p.brightness for p in s.atmosphere.plumes.values()], liquid, [np.zeros(6)] * 2
     )

@@ -31,7 +31,7 @@ from abi_operator.optics import column_optics
 from abi_operator.optics.mie_table import mie_table
 
 SEED = 20050828
-FEW, MANY = 6, 26  # columns of each kind
+FEW, MANY = 4, 26  # columns of each kind
 STREAMS = 8
 # Enough for any layer here.
 DOUBLINGS = 10

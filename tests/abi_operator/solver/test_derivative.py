@@ -150,8 +150,18 @@ MAPPED = {
 }
 
 
-@pytest.mark.parametrize("f", [BY_REVERSE, BY_HAND], ids=["default", "given gradient"])
-@pytest.mark.parametrize("name", MAPPED)
+# With a gradient given by hand the rule of mapping is the same; all of these are behind `slow`.
+GIVEN = "vmap of jacrev", "vmap of jvp", "hessian of vmap"
+
+
+@pytest.mark.parametrize(
+    ("f", "name"),
+    [
+        *((BY_REVERSE, name) for name in MAPPED),
+        *((BY_HAND, name) for name in GIVEN),
+        *(pytest.param(BY_HAND, x, marks=pytest.mark.slow) for x in MAPPED if x not in GIVEN),
+    ],
+)
 def test_one_column_mapped(f, name):
     given = batch_first(columns())
     close(jax.jit(MAPPED[name](f))(given), plain_mapped(name))
