@@ -15,7 +15,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from typing import Any
 
@@ -83,11 +83,9 @@ def map_chunks(
             place = np.minimum(np.arange(start, start + width), size - 1)
         some: list[Any] = [x[place] if each else x for x, each in zip(host, own, strict=True)]
         # Settings of the caller's thread, not of this one.
-        with jax.enable_x64(x64), jax.default_device(device):
-            if known(width):
-                return jax.block_until_ready(function(some))
-            with _no_search_for_garbage():
-                return jax.block_until_ready(function(some))
+        tracing = nullcontext() if known(width) else _no_search_for_garbage()
+        with jax.enable_x64(x64), jax.default_device(device), tracing:
+            return jax.block_until_ready(function(some))
 
     def known(width: int) -> bool:
         return (key, shapes, width, x64) in _compiled
@@ -95,14 +93,13 @@ def map_chunks(
     # Never in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives, would
     # be part of what JAX knows a compiled program by.
     threads = _threads(os.getpid())
-    new = [c for c in _first_of_each(chunks) if len(chunks) == 1 or not known(c[1])]
+    new = [c for c in _first_of_each(chunks) if not known(c[1])]
     found = {c: threads.submit(solve, *c).result() for c in new}
     _compiled.update((key, shapes, width, x64) for _, width in chunks)
-    if len(chunks) == 1 and batch == (chunks[0][1],):
-        return found[chunks[0]]
     rest = [c for c in chunks if c not in found]
     found |= zip(rest, threads.map(lambda c: solve(*c), rest), strict=True)
-    return _joined(found, batch)
+    whole = len(chunks) == 1 and batch == (chunks[0][1],)
+    return found[chunks[0]] if whole else _joined(found, batch)
 
 
 def cut(size: int, widths: Sequence[int], num_cores: int) -> list[tuple[int, int]]:
@@ -139,7 +136,7 @@ def _first_of_each(chunks: list[tuple[int, int]]) -> list[tuple[int, int]]:
 
 @contextmanager
 def _no_search_for_garbage() -> Iterator[None]:
-    """Tracing makes many small objects that stay: a tenth of it is to search for others."""
+    """Tracing makes many small objects that stay; to search for others takes part of its time."""
     searching = gc.isenabled()
     gc.disable()
     try:

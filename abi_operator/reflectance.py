@@ -103,7 +103,7 @@ def reflectance_factor(
     return _with_the_suns_cosine(value, state.geometry.solar_zenith, state.geometry.view_zenith)
 
 
-# One program each: operation by operation, forward and backward, they were thirty.
+# One program each, and not one for every operation, forward and backward.
 
 
 @jax.jit

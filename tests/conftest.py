@@ -12,7 +12,7 @@ if "JAX_ENABLE_X64" not in os.environ:
     jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 
-# As in the commands: a twentieth of all time is a search for what tracing might leave behind.
+# As in the commands: tracing makes many small objects that stay.
 gc.freeze()
 gc.set_threshold(50_000)
 

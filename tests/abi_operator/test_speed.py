@@ -99,7 +99,7 @@ def finish(*children, quiet=True):
 
 
 def test_full_speed_is_what_nobody_has_chosen_otherwise():
-    flags = "--xla_cpu_prefer_vector_width=256 --xla_backend_extra_options=one=two"
+    flags = "--xla_cpu_prefer_vector_width=256 --xla_backend_extra_options=xla_one=two"
     with_devices = f"{flags} --xla_force_host_platform_device_count=3"
     by_flags = start(USERS_CHOICE, XLA_FLAGS=with_devices)
     (sentence,) = finish(start(FULL_SPEED))

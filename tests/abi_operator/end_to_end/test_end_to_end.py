@@ -47,8 +47,11 @@ EMITTING = ("C05", "C06", "C07")
 
 @pytest.fixture(scope="module", params=[FEW, pytest.param(MANY, marks=pytest.mark.slow)])
 def columns(request):
-    each = max(FEW, round(request.param * request.config.getoption("--scale")))
-    return independent_columns.specified_columns(each, SEED)
+    """Of each kind the last, so that a sample of many columns is not that of few."""
+    many = request.param
+    each = max(FEW, round(many * request.config.getoption("--scale")))
+    every = independent_columns.specified_columns(many, SEED)
+    return [c for k, c in enumerate(every) if k % many >= many - each]
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +83,7 @@ def test_reflectances_of_seven_bands(columns, reflected):
         [independent.cdisort_sum(c, b, independent.layers(c, b), STREAMS) for b in BANDS]
         for c in columns
     ]
-    assert reflected.shape == (len(columns), len(BANDS))
+    assert reflected.shape == (len(columns), len(BANDS)) and len(KINDS) * MANY >= 200
     assert_equal(reflected, np.array(reference), columns, BANDS)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from surfaces import Bowl
 
+from abi_operator._numerics import Rows
 from abi_operator.solver import toa_brf
 from abi_operator.solver.adjoint import ModeSum, mode_sum, reflectance_and_gradient
 from abi_operator.solver.azimuth import (
@@ -17,9 +18,12 @@ from abi_operator.solver.azimuth import (
     legendre_tables,
     weighted_moments,
 )
+from abi_operator.solver.bordered import Bordered
 from abi_operator.solver.delta_m import ScaledLayers
-from abi_operator.solver.doublings import layer_doublings
+from abi_operator.solver.doublings import Doublings, layer_doublings
 from abi_operator.solver.ground import lambertian, reflecting
+from abi_operator.solver.layer_adjoint import climb
+from abi_operator.solver.room import Keeper
 
 # Both ways sum some 1e4 products, in different orders; relative to a column's largest slope.
 AGREE = 1e-11
@@ -207,6 +211,33 @@ def test_constants_cost_nothing():
     change = jax.jit(lambda tau: jax.jvp(of_thickness, (tau,), (tangent,))[1])(inputs.tau)
     slopes = BOTH(inputs, once, False)[1]
     np.testing.assert_allclose(change, jnp.sum(slopes.tau, axis=0), rtol=AGREE)
+
+
+@pytest.mark.parametrize("num_streams", [2, 4, 6, 12])
+def test_room_is_what_a_layer_keeps(num_streams):
+    """It is written down, as to trace a layer for it would take longer than all the rest."""
+    n = num_streams // 2
+    like = jnp.zeros((3, 5))
+
+    def climbed(matrix, tau):
+        _, *kept = climb(
+            matrix, matrix, matrix, tau, Doublings(None, 1), None, lambda _, new, k: new
+        )
+        return [
+            jax.tree.map(
+                lambda x: x.joined() if isinstance(x, Rows) else x,
+                part,
+                is_leaf=lambda x: isinstance(x, Rows),
+            )
+            for part in kept
+        ]
+
+    shapes = (n, n, 5), (n, 2, 5), (2, 5), (1, 5)
+    kept = jax.eval_shape(climbed, Bordered(*map(jnp.zeros, shapes)), jnp.zeros(5))
+    found = Keeper(like, n, 1).shapes
+    for ours, traced in zip(found, kept, strict=True):
+        assert jax.tree.structure(ours) == jax.tree.structure(traced)
+        assert jax.tree.leaves(ours) == jax.tree.leaves(traced)
 
 
 @pytest.mark.slow  # of the solver that this serves it is in `test_gradients`
