@@ -1,4 +1,11 @@
-"""Precision and strictness under which every test runs."""
+"""Precision, strictness and compiler under which tests run.
+
+Compiling takes most of a test's time, and most tests ask a program for a few columns once. So
+where no long study is among them, programs are compiled without most of XLA's and LLVM's
+optimisations (`_OPTIMISED`, JAX's own switch, left alone where it is set). Studies, the tests of
+single precision and those with the lowest versions see programs as users do, and so does the guard
+on every Jacobian: `.ci/run` has all of them.
+"""
 
 import gc
 import os
@@ -24,6 +31,8 @@ _CACHE, _SHORTEST_COMPILATION = "JAX_COMPILATION_CACHE_DIR", 0.0
 # dashes: those behind one that does not are passed over.
 _EXTRA = "--xla_backend_extra_options"
 _LEAN = f"{_EXTRA}=xla_cpu_disable_new_fusion_emitters=true,xla_cpu_disable_loop_unrolling=true"
+
+_OPTIMISED = "JAX_DISABLE_MOST_OPTIMIZATIONS"
 
 
 def pytest_configure(config):
@@ -61,6 +70,14 @@ def pytest_collection_modifyitems(config, items):
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
+
+
+def pytest_collection_finish(session):
+    """Compile for a single call, in this process and in those that tests start."""
+    studies = any(item.get_closest_marker("slow") for item in session.items)
+    if _OPTIMISED not in os.environ and not studies:
+        os.environ[_OPTIMISED] = "1"
+        jax.config.update(_OPTIMISED.lower(), True)
 
 
 @pytest.fixture
