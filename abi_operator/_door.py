@@ -29,6 +29,7 @@ from jaxtyping import Array, Float
 from . import _compiler
 from ._batching import announced
 from ._chunks import can_be_cut, map_chunks
+from ._kept import Kept
 
 Leaves = Sequence[Any]
 
@@ -131,7 +132,7 @@ def _shapes(program: Program, what: Any, leaves: Leaves) -> Any:
 
 
 def _inlined(*leaves: Array, program: Program, what: Any) -> list[Array]:
-    return jax.tree.leaves(_jitted(what, False)(program.unknown(what), list(leaves)))
+    return jax.tree.leaves(_inside((program.unknown(what), what), list(leaves)))
 
 
 mlir.register_lowering(_columns, mlir.lower_fun(_inlined, multiple_results=True))
@@ -144,7 +145,7 @@ def _jvp(primals: Leaves, tangents: Leaves, *, program: Program, what: Any) -> A
         full = [_with_zeros(x, t) for x, t in zip(primals, tangents, strict=True)]
 
         def both(*leaves: Array) -> list[Array]:
-            return jax.tree.leaves(_jitted(what, False)(fixed, list(leaves)))
+            return jax.tree.leaves(_inside((fixed, what), list(leaves)))
 
         return jax.jvp(both, tuple(primals), tuple(full))
     wanted = tuple(_perturbs(x) for x in tangents)
@@ -228,7 +229,7 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
     size = math.prod(batch)
     fixed = program.known(leaves, what)
     if size == 0 or not can_be_cut(leaves):
-        return _jitted(what, False)(fixed, [jnp.asarray(x) for x in leaves])
+        return _inside((fixed, what), [jnp.asarray(x) for x in leaves])
     # Of one column alone, too, what is given without an axis is shared: the program is the same.
     own = [math.prod(shape) > 1 or size == 1 and len(shape) == len(batch) for shape in shapes]
     flat = [
@@ -236,8 +237,7 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
         for x, n, each in zip(leaves, counts, own, strict=True)
     ]
     key = fixed, what
-    function = partial(_jitted(what, True), fixed)
-    return map_chunks(function, key, flat, own, batch, fixed.widths(flat))
+    return map_chunks(partial(_alone(), key), key, flat, own, batch, fixed.widths(flat))
 
 
 def _flat(x: np.ndarray, own: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
@@ -245,20 +245,24 @@ def _flat(x: np.ndarray, own: tuple[int, ...], batch: tuple[int, ...]) -> np.nda
     return np.broadcast_to(x, (*batch, *own)).reshape(-1, *own) if batch else x.reshape(1, *own)
 
 
+def _wanted(of: tuple[Program, Any], leaves: Leaves) -> Any:
+    """The value, or the value and slopes in what is wanted."""
+    program, what = of
+    if what == "value":
+        return program.value(leaves)
+    return program.value_and_slopes(leaves, what)
+
+
+_inside = jax.jit(_wanted, static_argnums=0)
+
+
 @cache
-def _jitted(what: Any, alone: bool) -> Any:
-    """The value, or the value and slopes in what is wanted, compiled.
+def _alone() -> Kept:
+    """The same, called with values, so that options of the compiler can be given.
 
-    `alone`: called with values, so that options of the compiler can be given, which JAX does not
-    take inside another `jax.jit`.
+    JAX does not take these inside another `jax.jit`.
     """
-
-    def call(program: Program, leaves: Leaves) -> Any:
-        if what == "value":
-            return program.value(leaves)
-        return program.value_and_slopes(leaves, what)
-
-    return jax.jit(call, static_argnums=0, compiler_options=_compiler.options() if alone else None)
+    return Kept(_wanted, _compiler.options())
 
 
 def slopes_by_reverse_mode(

@@ -22,6 +22,7 @@ from typing import Annotated, Any
 import jax
 import typer
 
+from . import _kept
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence
 from .demo import write_demo
@@ -248,7 +249,9 @@ def _prepare_process(keep_programs: bool) -> None:
     if not keep_programs:
         jax.config.update("jax_enable_compilation_cache", False)
     with _user_warnings():
-        use_compilation_cache()
+        folder = use_compilation_cache()
+    if folder is not None:
+        _kept.use(folder)
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ as wide as LLVM likes them, and is compiled for half as long again: `use_full_sp
 three before JAX starts.
 
 `use_compilation_cache` keeps what is compiled, for the next process; the command line does so by
-itself. Importing this package sets nothing, and neither function changes what the user has set.
+itself, and keeps what a `Kept` has compiled such that it need not be traced (`_kept`). Importing this package sets nothing, and neither function changes what the user has set.
 """
 
 import os
@@ -20,6 +20,7 @@ import jax
 from jax.experimental.compilation_cache.compilation_cache import reset_cache
 
 from . import _compiler
+from ._kept import Kept as Kept
 from ._processor import processor_key, vector_bits
 from ._processor import usable_cores as usable_cores
 

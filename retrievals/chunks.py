@@ -26,7 +26,7 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUN
     Parameters
     ----------
     function
-        From arrays of one chunk to arrays, compiled by `jax.jit`, pixels leading in all of them.
+        From arrays of one chunk to arrays, compiled, pixels leading in all of them.
     arguments
         Arrays of all pixels, one pixel or more. The last chunk is filled up with copies of the
         last pixel, so that one program serves all.

@@ -1,6 +1,7 @@
 """The forward model of a retrieval: state vector in, reflectance factors out."""
 
 from dataclasses import replace
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -11,8 +12,13 @@ from jaxtyping import Array, Float
 from abi_operator import BANDS, Atmosphere, Plume, State, reflectance_factor
 from abi_operator.optics import ALL_GASES, column_optics
 from abi_operator.solver import sufficient_doublings
+from abi_operator.speed import Kept
 
+from .chunks import map_chunks
 from .state_vector import StateVector
+
+# Columns of which the thickest layers are read in one call.
+_READ_TOGETHER = 256
 
 
 class ForwardModel(eqx.Module):
@@ -75,16 +81,24 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
     states
         Concrete columns, batched along one leading axis.
     """
+    max_tau = np.max(map_chunks(partial(_largest_tau, forward), states, chunk=_READ_TOGETHER))
+    min_mu = min(
+        np.min(np.cos(x)) for x in (states.geometry.solar_zenith, states.geometry.view_zenith)
+    )
+    num_doublings = sufficient_doublings(float(max_tau), float(min_mu), forward.num_streams)
+    return replace(forward, num_doublings=num_doublings)
+
+
+@Kept
+def _largest_tau(forward: ForwardModel, states: State) -> Float[Array, " column"]:
+    """Optical depth of the thickest layer of each column at the limit of the state vector. [-]"""
     num_columns = states.geometry.solar_zenith.shape[0]
     thickest = jnp.full((num_columns, forward.vector.size), jnp.inf)
     thickest = thickest.at[:, 1:].set(0)
     atmospheres = forward.state(thickest, states).atmosphere
 
-    def largest_tau(atmosphere: Atmosphere) -> Float[Array, ""]:
+    def of_one(atmosphere: Atmosphere) -> Float[Array, ""]:
         optics = [column_optics(atmosphere, BANDS[band], forward.gases) for band in forward.bands]
         return jnp.max(jnp.stack([jnp.max(layers.tau) for layers in optics]))
 
-    max_tau = jnp.max(jax.jit(jax.vmap(largest_tau))(atmospheres))
-    min_mu = min(np.min(states.geometry.mu0), np.min(states.geometry.mu))
-    num_doublings = sufficient_doublings(float(max_tau), float(min_mu), forward.num_streams)
-    return replace(forward, num_doublings=num_doublings)
+    return jax.vmap(of_one)(atmospheres)

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from abi_operator import State
+from abi_operator.speed import Kept
 
 from .chunks import CHUNK, map_chunks, meanwhile
 from .first_guess import candidates, guesses, scan
@@ -53,8 +54,10 @@ def retrieve_pixels(
         See `result_codes`.
     """
     starts = np.asarray(guesses(forward))
-    invert_chunk = _in_rounds(forward, minimiser, prior, starts.dtype)
-    with meanwhile(partial(map_chunks, invert_chunk, *_first_chunk(observations, states, starts))):
+    how = _in_rounds(forward, minimiser, prior, starts.dtype)
+    invert_chunk = partial(_invert_chunk, *how)
+    first = _first_chunk(observations, states, starts)
+    with meanwhile(partial(_invert_chunk.prepare, *how, *first)):
         cost = map_chunks(partial(_scan_chunk, forward), observations, states)
     pixel, guess = candidates(cost)
     order = np.lexsort((pixel, guess))  # chunks of similar pixels, which take as many steps
@@ -69,18 +72,18 @@ def retrieve_pixels(
 
 def _in_rounds(
     forward: ForwardModel, minimiser: Minimiser, prior: Prior | None, dtype: Any
-) -> Callable[..., Inversion]:
-    """Some steps of a chunk's minimisation; the damping of Levenberg-Marquardt begins anew."""
+) -> tuple[tuple[ForwardModel, Minimiser], Prior | None]:
+    """For some steps of a minimisation; the damping of Levenberg-Marquardt begins anew."""
     this_round = minimiser._replace(max_steps=min(ROUND_STEPS, minimiser.max_steps))
     prior = jax.tree.map(lambda x: np.asarray(x, dtype), prior)
-    return partial(_invert_chunk, forward, this_round, prior)
+    return (forward, this_round), prior
 
 
 def _first_chunk(observations: Observation, states: State, starts: np.ndarray) -> tuple[Any, ...]:
-    """Pixels with which the program that minimises is compiled while another one scans."""
-    some = jax.tree.map(lambda x: np.asarray(x)[:CHUNK], (observations, states))
-    count = len(some[0].sigma)
-    return *some, np.repeat(starts[:1], count, axis=0)
+    """Pixels for which the program that minimises is compiled while another one scans."""
+    rows = np.minimum(np.arange(CHUNK), len(observations.sigma) - 1)
+    some = jax.tree.map(lambda x: np.asarray(x)[rows], (observations, states))
+    return *some, np.repeat(starts[:1], CHUNK, axis=0)
 
 
 def _minimise(
@@ -110,20 +113,21 @@ def _with_rows(rows: np.ndarray, array: np.ndarray, values: np.ndarray) -> np.nd
     return array
 
 
-@partial(jax.jit, static_argnums=0)
+@Kept
 def _scan_chunk(forward: ForwardModel, observations: Observation, states: State) -> jax.Array:
     return jax.vmap(partial(scan, forward))(observations, states)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@Kept
 def _invert_chunk(
-    forward: ForwardModel,
-    minimiser: Minimiser,
+    how: tuple[ForwardModel, Minimiser],
     prior: Prior | None,
     observations: Observation,
     states: State,
     x_first: jax.Array,
 ) -> Inversion:
+    forward, minimiser = how
+
     def solve(observation: Observation, state: State, x: jax.Array) -> Inversion:
         return invert(forward, observation, state, x, prior, minimiser)
 

@@ -22,7 +22,7 @@ FLOORS = [
     {"geometry", "planck"},
     {"satellites", "_door", "_elimination"},
     {"_chunks", "speed"},
-    {"_compiler"},
+    {"_compiler", "_kept"},
     {
         "_batching",
         "_kernels",

@@ -1,10 +1,18 @@
-"""Where the sun and a geostationary satellite stand, seen from each column."""
+"""Where the sun and a geostationary satellite stand, seen from each column.
+
+Positions are pyorbital's. Only `pyorbital.astronomy` is imported of it: `pyorbital.orbital`,
+which has look angles, imports SciPy's optimisation, a fifth of what a command needs to start.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
-from pyorbital.astronomy import get_alt_az, sun_earth_distance_correction
-from pyorbital.orbital import get_observer_look
+from pyorbital.astronomy import (
+    get_alt_az,
+    gmst,
+    observer_position,
+    sun_earth_distance_correction,
+)
 
 from ..constants import SATELLITE_HEIGHT
 from ..nomenclature import GRAZING_ZENITH, QUALITY_FLAGS
@@ -52,17 +60,36 @@ def find_angles(
         Longitude above which the satellite stands still, at 35786 km. [degree]
     """
     altitude, azimuth = get_alt_az(time, longitude, latitude)
-    satellite_azimuth, elevation = get_observer_look(
-        satellite_longitude,
-        0.0,
-        SATELLITE_HEIGHT / 1e3,
-        time,
-        longitude,
-        latitude,
-        np.zeros_like(latitude),
-    )
+    view_zenith, satellite_azimuth = _look(time, latitude, longitude, satellite_longitude)
     apart = np.abs(np.degrees(azimuth) - satellite_azimuth) % 360
-    return Angles(90 - np.degrees(altitude), 90 - elevation, np.minimum(apart, 360 - apart))
+    return Angles(90 - np.degrees(altitude), view_zenith, np.minimum(apart, 360 - apart))
+
+
+def _look(
+    time: np.datetime64 | np.ndarray,
+    latitude: np.ndarray,
+    longitude: np.ndarray,
+    satellite_longitude: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Zenith angle of a satellite above the equator, and its azimuth, clockwise from north.
+
+    Parameters
+    ----------
+    time
+        One time, UTC, at which all positions are taken; the angles do not depend on it.
+    latitude, longitude, satellite_longitude
+        As of `find_angles`; zenith is normal to the ellipsoid. [degree]
+    """
+    ground, _ = observer_position(time, longitude, latitude, 0.0)
+    satellite, _ = observer_position(time, satellite_longitude, 0.0, SATELLITE_HEIGHT / 1e3)
+    x, y, z = (there - here for there, here in zip(satellite, ground, strict=True))
+    phi, sidereal = np.radians(latitude), gmst(time) + np.radians(longitude)
+    outward = np.cos(sidereal) * x + np.sin(sidereal) * y
+    east = np.cos(sidereal) * y - np.sin(sidereal) * x
+    up = np.cos(phi) * outward + np.sin(phi) * z
+    north = np.cos(phi) * z - np.sin(phi) * outward
+    zenith = np.arctan2(np.hypot(east, north), up)
+    return np.degrees(zenith), np.degrees(np.arctan2(east, north))
 
 
 def sun_distance(time: np.datetime64 | np.ndarray) -> float:

@@ -263,7 +263,7 @@ def test_every_command_may_keep_what_it_compiles(monkeypatch, capsys):
 PROCESS = """
 import os, sys
 import jax
-from abi_operator import _processor, cli
+from abi_operator import _kept, _processor, cli
 sys.argv = ["abi-operator", *sys.argv[1:]]
 try:
     cli.main()
@@ -273,7 +273,9 @@ bits = _processor.vector_bits()
 assert bits is None or f"--xla_cpu_prefer_vector_width={bits} " in os.environ["XLA_FLAGS"]
 assert "--xla_backend_extra_options=" in os.environ["XLA_FLAGS"]
 assert jax.config.jax_num_cpu_devices == -1
-print(jax.config.jax_compilation_cache_dir)
+folder = jax.config.jax_compilation_cache_dir
+assert str(_kept._folder) == str(folder)
+print(folder)
 """
 
 

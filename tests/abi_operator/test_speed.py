@@ -4,10 +4,10 @@ import os
 import subprocess
 import sys
 import warnings
-from contextlib import contextmanager
 
 import jax
 import pytest
+from jax_settings import settings
 
 from abi_operator import _processor, speed
 
@@ -147,19 +147,6 @@ def test_a_users_folder_stays(monkeypatch, tmp_path):
     with settings(jax_enable_compilation_cache=False):
         assert speed.use_compilation_cache(tmp_path) is None
     assert not any(tmp_path.iterdir())
-
-
-@contextmanager
-def settings(**values):
-    """Settings of JAX, put back afterwards."""
-    previous = {name: getattr(jax.config, name) for name in values}
-    try:
-        for name, value in values.items():
-            jax.config.update(name, value)
-        yield
-    finally:
-        for name, value in previous.items():
-            jax.config.update(name, value)
 
 
 def test_the_default_folder_is_the_users(monkeypatch, tmp_path):

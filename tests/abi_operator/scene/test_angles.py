@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from pyorbital.orbital import get_observer_look
 
+from abi_operator.constants import SATELLITE_HEIGHT
 from abi_operator.nomenclature import QUALITY_FLAGS
-from abi_operator.scene.angles import Angles, angle_flags, find_angles
+from abi_operator.scene.angles import Angles, _look, angle_flags, find_angles
 
 # The last printed digit of the values below.
 PRINTED = 0.051
@@ -39,6 +41,18 @@ def test_view_zenith_angle(satellite_longitude, zenith):
     """Values by spherical trigonometry."""
     view = angles("2007-10-23T18:00", 33.0, -117.0, satellite_longitude).view_zenith
     np.testing.assert_allclose(view, zenith, atol=PRINTED)
+
+
+def test_the_satellite_stands_where_pyorbital_sees_it():
+    rng, time = np.random.default_rng(3), np.datetime64("2007-10-23T18:00", "ns")
+    latitude, longitude = rng.uniform(-60, 60, 500), rng.uniform(-130, -20, 500)
+    azimuth, elevation = get_observer_look(
+        -75.2, 0.0, SATELLITE_HEIGHT / 1e3, time, longitude, latitude, np.zeros(500)
+    )
+    zenith, own = _look(time, latitude, longitude, -75.2)
+    # A direction from its sine, to 1e-16 over the cosine of 88 degrees.
+    np.testing.assert_allclose(zenith, 90 - elevation, rtol=0, atol=1e-9)
+    np.testing.assert_allclose((own - azimuth + 180) % 360, 180, rtol=0, atol=1e-9)
 
 
 def test_relative_azimuth_is_folded_and_zero_on_the_same_side():
