@@ -7,7 +7,8 @@ as wide as LLVM likes them, and is compiled for half as long again: `use_full_sp
 three before JAX starts.
 
 `use_compilation_cache` keeps what is compiled, for the next process; the command line does so by
-itself, and keeps what a `Kept` has compiled such that it need not be traced (`_kept`). Importing this package sets nothing, and neither function changes what the user has set.
+itself, and keeps what a `Kept` has compiled such that it need not be traced either (`_kept`).
+Importing this package sets nothing, and neither function changes what the user has set.
 """
 
 import os
