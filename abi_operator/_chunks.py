@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from functools import cache
+from threading import Lock
 from typing import Any
 
 import jax
@@ -24,6 +25,8 @@ import numpy as np
 from jaxtyping import Array
 
 from ._processor import usable_cores
+
+_ALIGNMENT = 64  # bytes
 
 # What has been compiled: of several threads with a new program each would compile it.
 _compiled: set[Any] = set()
@@ -73,6 +76,8 @@ def map_chunks(
     size = math.prod(batch)
     host = [np.asarray(x) for x in arrays]
     chunks = cut(size, widths, usable_cores())
+    whole = len(chunks) == 1 and batch == (chunks[0][1],)
+    results = _Results(size)
     x64 = jax.dtypes.canonicalize_dtype(np.float64) == np.float64
     device = jax.local_devices()[0]
     shapes = tuple(x.shape[each:] for x, each in zip(host, own, strict=True))
@@ -85,7 +90,8 @@ def map_chunks(
         # Settings of the caller's thread, not of this one.
         tracing = nullcontext() if known(width) else _no_search_for_garbage()
         with jax.enable_x64(x64), jax.default_device(device), tracing:
-            return jax.block_until_ready(function(some))
+            found = jax.block_until_ready(function(some))
+        return found if whole else results.put(start, found)
 
     def known(width: int) -> bool:
         return (key, shapes, width, x64) in _compiled
@@ -94,12 +100,10 @@ def map_chunks(
     # be part of what JAX knows a compiled program by.
     threads = _threads(os.getpid())
     new = [c for c in _first_of_each(chunks) if not known(c[1])]
-    found = {c: threads.submit(solve, *c).result() for c in new}
-    _compiled.update((key, shapes, width, x64) for _, width in chunks)
-    rest = [c for c in chunks if c not in found]
-    found |= zip(rest, threads.map(lambda c: solve(*c), rest), strict=True)
-    whole = len(chunks) == 1 and batch == (chunks[0][1],)
-    return found[chunks[0]] if whole else _joined(found, batch)
+    found = [threads.submit(solve, *c).result() for c in new]
+    _compiled.update((key, shapes, width, x64) for _, width in new)
+    found += threads.map(lambda c: solve(*c), [c for c in chunks if c not in new])
+    return found[0] if whole else results.shaped(batch)
 
 
 def cut(size: int, widths: Sequence[int], num_cores: int) -> list[tuple[int, int]]:
@@ -152,13 +156,31 @@ def _threads(_process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(usable_cores(), thread_name_prefix="abi-operator")
 
 
-def _joined(found: dict[tuple[int, int], Any], batch: tuple[int, ...]) -> Any:
-    """One array of the results of all chunks; put together here, where it needs no program."""
-    size = math.prod(batch)
-    some = next(iter(found.values()))
-    arrays = [np.empty((size, *x.shape[1:]), x.dtype) for x in jax.tree.leaves(some)]
-    for (start, width), result in found.items():
-        for array, part in zip(arrays, jax.tree.leaves(result), strict=True):
-            array[start : start + width] = np.asarray(part)[: size - start]
-    shaped = [jax.device_put(x.reshape((*batch, *x.shape[1:]))) for x in arrays]
-    return jax.tree.unflatten(jax.tree.structure(some), shaped)
+class _Results:
+    """Arrays of all columns, into which each chunk is copied by the thread that has solved it."""
+
+    def __init__(self, size: int) -> None:
+        self._size, self._lock = size, Lock()
+        self._arrays: list[np.ndarray] = []
+        self._structure: Any = None
+
+    def put(self, start: int, found: Any) -> None:
+        parts, structure = jax.tree.flatten(found)
+        with self._lock:
+            if self._structure is None:
+                self._arrays = [_aligned((self._size, *x.shape[1:]), x.dtype) for x in parts]
+                self._structure = structure
+        for array, part in zip(self._arrays, parts, strict=True):
+            array[start : start + len(part)] = np.asarray(part)[: self._size - start]
+
+    def shaped(self, batch: tuple[int, ...]) -> Any:
+        arrays = [jax.device_put(x.reshape((*batch, *x.shape[1:]))) for x in self._arrays]
+        return jax.tree.unflatten(self._structure, arrays)
+
+
+def _aligned(shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+    """An array that JAX takes as it is, which one is that begins where XLA's own do."""
+    count = math.prod(shape) * dtype.itemsize
+    memory = np.empty(count + _ALIGNMENT, np.uint8)
+    first = -memory.ctypes.data % _ALIGNMENT
+    return memory[first : first + count].view(dtype).reshape(shape)

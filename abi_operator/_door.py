@@ -57,8 +57,8 @@ class Program(Protocol):
         """What `value` gives of one column: a pytree of `jax.ShapeDtypeStruct`."""
         ...
 
-    def widths(self, leaves: Leaves) -> Sequence[int]:
-        """Numbers of columns that are worth a program, rising."""
+    def widths(self, leaves: Leaves, what: Any) -> Sequence[int]:
+        """Numbers of columns that are worth a program of what is wanted, rising."""
         ...
 
     def value(self, leaves: Leaves) -> Any:
@@ -85,7 +85,9 @@ def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     """What is wanted of a program: at once of values, else as one operation of what is traced."""
     if not any(isinstance(x, Tracer) for x in leaves):
         return _call(program, what, leaves)
-    arrays = announced([jnp.asarray(x) for x in leaves], math.prod(_batch_of(program, leaves)))
+    # Even a conversion that does nothing takes JAX a millisecond where derivatives are taken.
+    arrays = [x if isinstance(x, jax.Array) else jnp.asarray(x) for x in leaves]
+    arrays = announced(arrays, math.prod(_batch_of(program, leaves)))
     found = _columns.bind(*arrays, program=program, what=what)
     return jax.tree.unflatten(jax.tree.structure(_shapes(program, what, leaves)), found)
 
@@ -237,7 +239,7 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
         for x, n, each in zip(leaves, counts, own, strict=True)
     ]
     key = fixed, what
-    return map_chunks(partial(_alone(), key), key, flat, own, batch, fixed.widths(flat))
+    return map_chunks(partial(_alone(), key), key, flat, own, batch, fixed.widths(flat, what))
 
 
 def _flat(x: np.ndarray, own: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:

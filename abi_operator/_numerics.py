@@ -20,6 +20,17 @@ _WRITTEN_OUT = 16  # longest sum of a matrix product that is written out
 _IN_PARTS = range(5, 9)  # such sums are two operations in float32
 
 
+def converted(x: Any, dtype: Any) -> Any:
+    """An array of a floating type; one that is of it already is returned as it is.
+
+    JAX would convert it all the same, which takes a millisecond wherever a derivative is taken.
+    """
+    x = x if isinstance(x, jax.Array) else np.asarray(x)
+    if x.dtype == dtype and not getattr(x, "weak_type", False):
+        return x
+    return x.astype(dtype)
+
+
 def fenced(function: Callable) -> Callable:
     """Compile `function` as a kernel of its own inside a larger program.
 

@@ -78,7 +78,7 @@ class _Program(NamedTuple):
     def own_result(self, leaves: Leaves) -> Any:
         return jax.ShapeDtypeStruct((len(self.options.bands),), leaves[0].dtype)
 
-    def widths(self, leaves: Leaves) -> tuple[int, ...]:
+    def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         tile = tile_of_states(leaves, self.structure, self.options)
         return 1, tile, 8 * tile
 
@@ -111,7 +111,7 @@ class _Depths(NamedTuple):
     def own_result(self, leaves: Leaves) -> Any:
         return jax.ShapeDtypeStruct((), leaves[0].dtype)
 
-    def widths(self, leaves: Leaves) -> tuple[int, ...]:
+    def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         return _READ_WIDTHS
 
     def value(self, leaves: Leaves) -> Array:

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from ._numerics import converted
 from .atmosphere import State
 from .bands import check_bands
 from .satellites import check_satellite, gas_fit_covers
@@ -122,7 +123,7 @@ def uniform(state: State) -> tuple[State, tuple[int, ...]]:
     batch = np.shape(state.geometry.solar_zenith)
 
     def cast(path: Any, x: Any) -> Any:
-        x = jnp.asarray(x).astype(dtype)
+        x = converted(x, dtype)
         is_of_ground = len(path) > 2 and getattr(path[0], "name", None) == "albedo"
         if is_of_ground and x.ndim == 0:
             return jnp.broadcast_to(x, batch)

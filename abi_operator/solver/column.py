@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._batching import on_every_device
+from .._numerics import converted
 from .doublings import sufficient_doublings
 from .surface import AnySurface, Lambertian
 
@@ -78,7 +79,7 @@ def promoted(**arguments: Any) -> Column:
         for leaf, array in zip(leaves, arrays, strict=True)
     ]
     dtype = jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
-    return jax.tree.unflatten(structure, [x.astype(dtype, copy=False) for x in arrays])
+    return jax.tree.unflatten(structure, [converted(x, dtype) for x in arrays])
 
 
 def check_shapes(column: Column, num_moments: int, multiple_views: bool) -> None:

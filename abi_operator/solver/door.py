@@ -116,9 +116,11 @@ class _Program(NamedTuple):
             lambda has: jax.ShapeDtypeStruct(views if has else (), dtype), self.by_view
         )
 
-    def widths(self, leaves: Leaves) -> tuple[int, ...]:
+    def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         tile = tile_size(self.options.num_streams, leaves[0].dtype)
-        return 8, tile, 8 * tile
+        # Values at few streams are solved in hardly more time than a chunk needs to begin.
+        brief = what == "value" and self.options.num_streams <= 4
+        return (8, tile, 8 * tile, 16 * tile) if brief else (8, tile, 8 * tile)
 
     def value(self, leaves: Leaves) -> Any:
         column = jax.tree.unflatten(self.structure, leaves)

@@ -30,7 +30,7 @@ class Waves:
         number = jax.ShapeDtypeStruct((), leaves[0].dtype)
         return {"sum": number, "sine": number}
 
-    def widths(self, leaves):
+    def widths(self, leaves, what):
         return 4, 16
 
     def value(self, leaves):

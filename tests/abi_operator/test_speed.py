@@ -189,4 +189,8 @@ def test_a_quota_of_the_cgroup_counts(monkeypatch, tmp_path, files, cores):
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(_processor, "_CGROUP", tmp_path)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(8), raising=False)
-    assert speed.usable_cores() == cores
+    _processor._quota.cache_clear()
+    try:
+        assert speed.usable_cores() == cores
+    finally:
+        _processor._quota.cache_clear()
