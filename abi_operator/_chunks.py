@@ -174,7 +174,7 @@ class _Results:
             array[start : start + len(part)] = np.asarray(part)[: self._size - start]
 
     def shaped(self, batch: tuple[int, ...]) -> Any:
-        arrays = [jax.device_put(x.reshape((*batch, *x.shape[1:]))) for x in self._arrays]
+        arrays = jax.device_put([x.reshape((*batch, *x.shape[1:])) for x in self._arrays])
         return jax.tree.unflatten(self._structure, arrays)
 
 
