@@ -85,7 +85,7 @@ def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     """What is wanted of a program: at once of values, else as one operation of what is traced."""
     if not any(isinstance(x, Tracer) for x in leaves):
         return _call(program, what, leaves)
-    # Even a conversion that does nothing takes JAX a millisecond where derivatives are taken.
+    # Even a conversion that does nothing is linearised where derivatives are taken (`converted`).
     arrays = [x if isinstance(x, jax.Array) else jnp.asarray(x) for x in leaves]
     arrays = announced(arrays, math.prod(_batch_of(program, leaves)))
     found = _columns.bind(*arrays, program=program, what=what)

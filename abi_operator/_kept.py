@@ -1,9 +1,10 @@
 """Compiled programs kept on disk by what they are called with, so that nothing has to be traced.
 
 JAX's cache of compiled programs knows a program by its code, for which it must be traced and
-lowered in every process: half of what a second demonstration would take. Here a program is known by
-the function, the values that it is compiled for, the shapes of its arguments, and all that traces
-and compiles them: the files of the packages that the function comes from, versions, settings.
+lowered in every process. Here a program is known by the function, the values that it is compiled
+for, the shapes of its arguments, and all that traces and compiles them: the files of the packages
+that the function comes from, versions, settings. `Kept` are the programs of plain calls (`_door`)
+and those of a retrieval.
 
 A process that exchanges functions of a package while it runs would be given the programs of its
 files. So only a process of our own, the command line, switches this on (`use`); elsewhere a `Kept`
@@ -133,9 +134,7 @@ def _read(path: Path) -> Callable[..., Any] | None:
         program = serialize_executable.deserialize_and_load(
             payload, inputs, outputs, execution_devices=jax.local_devices()[:1]
         )
-    except (
-        Exception
-    ):  # no file, a broken one, or one that this JAX does not read: it is written anew
+    except Exception:  # whatever ails the file, if there is one: it is written anew
         return None
     return partial(_call, program, tree)
 
@@ -215,7 +214,8 @@ def _digest(package: str) -> bytes:
 @cache
 def _environment() -> str:
     """What else a program depends on."""
-    versions = []
+    device = jax.local_devices()[0]
+    versions = [device.platform, device.device_kind]
     for name in _OTHERS:
         try:
             versions.append(f"{name} {version(name)}")

@@ -23,7 +23,7 @@ _IN_PARTS = range(5, 9)  # such sums are two operations in float32
 def converted(x: Any, dtype: Any) -> Any:
     """An array of a floating type; one that is of it already is returned as it is.
 
-    JAX would convert it all the same, which takes a millisecond wherever a derivative is taken.
+    JAX would convert it all the same, and linearise that wherever a derivative is taken.
     """
     x = x if isinstance(x, jax.Array) else np.asarray(x)
     if x.dtype == dtype and not getattr(x, "weak_type", False):
