@@ -27,7 +27,7 @@ from ._processor import usable_cores as usable_cores
 
 _DEVICES = "xla_force_host_platform_device_count"
 
-# Bytes of compiled programs that are kept. A demonstration leaves 3 MB, of 60 programs.
+# Bytes of compiled programs that are kept. A demonstration leaves 7 MB, of 40 programs.
 _KEPT = 512 * 2**20
 # What the smallest file counts in it: there are some thousand files at most, which are soon listed.
 _LEAST = 2**16

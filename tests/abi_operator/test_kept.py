@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from jax_settings import settings
 
-from abi_operator import _kept, speed
+from abi_operator import _door, _kept, speed
 from abi_operator._door import _wanted
+from abi_operator.solver import toa_brf
 
 MINE = """
 import jax, jax.numpy as jnp
@@ -146,3 +147,21 @@ def test_a_function_of_no_package_is_a_jit_as_well(monkeypatch, tmp_path):
     program = speed.Kept(lambda count, x: count * x)
     np.testing.assert_array_equal(program(2, jnp.arange(3.0)), [0, 2, 4])
     assert program._jitted._cache_size() == 1 and not any(tmp_path.iterdir())
+
+
+def test_what_was_written_is_read(monkeypatch, tmp_path):
+    """In one process: a second `Kept` finds what the first one wrote, and a third a broken file."""
+    monkeypatch.setattr(_kept, "_folder", tmp_path)
+    tau, moments = np.linspace(0.1, 1, 6).reshape(3, 2), np.full((2, 3), 0.7 ** np.arange(3))
+    found = []
+    for content in (None, None, b"broken"):
+        program = speed.Kept(_wanted)
+        monkeypatch.setattr(_door, "_alone", lambda program=program: program)
+        if content is not None:
+            next(tmp_path.iterdir()).write_bytes(content)
+        options = {"num_streams": 2, "num_modes": 1}
+        found.append(toa_brf(tau, np.full(2, 0.9), moments, 0.2, 0.6, 0.8, 0.5, **options))
+        (path,) = tmp_path.iterdir()
+        assert path.stat().st_size > 1000 and program._jitted._cache_size() == 0
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])

@@ -284,7 +284,7 @@ def solver_columns(count):
     return [jnp.asarray(x) for x in small_columns(count)]
 
 
-@pytest.mark.parametrize("several", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("several", [False, True])
 def test_solver_mapped_is_the_batch_in_value_and_gradient(several):
     """With one view and with two: compiled as a whole of more columns than a tile has, and as the
     batch in chunks.
@@ -302,6 +302,19 @@ def test_solver_mapped_is_the_batch_in_value_and_gradient(several):
     batch, expected = both(*given)
     np.testing.assert_allclose(values, expected, rtol=ROUNDING)
     close(mapped, batch, rtol=REAL_ROUNDING)
+
+
+def test_slopes_choose_their_doublings():
+    """From the thickest layer, where columns can be read: as with a number that suffices."""
+    given = solver_columns(3)
+    options = {name: x for name, x in SMALL.items() if name != "num_doublings"}
+    slopes = [
+        jax.grad(
+            lambda *x, n=number: jnp.sum(toa_brf(*x, num_doublings=n, **options)), tuple(range(7))
+        )(*given)
+        for number in (None, 14)
+    ]
+    close(*slopes, rtol=REAL_ROUNDING)
 
 
 def test_sunlight_and_emission_together():
