@@ -153,7 +153,7 @@ def test_what_was_written_is_read(monkeypatch, tmp_path):
     """In one process: a second `Kept` finds what the first one wrote, and a third a broken file."""
     monkeypatch.setattr(_kept, "_folder", tmp_path)
     tau, moments = np.linspace(0.1, 1, 6).reshape(3, 2), np.full((2, 3), 0.7 ** np.arange(3))
-    found = []
+    found, written = [], []
     for content in (None, None, b"broken"):
         program = speed.Kept(_wanted)
         monkeypatch.setattr(_door, "_alone", lambda program=program: program)
@@ -163,5 +163,7 @@ def test_what_was_written_is_read(monkeypatch, tmp_path):
         found.append(toa_brf(tau, np.full(2, 0.9), moments, 0.2, 0.6, 0.8, 0.5, **options))
         (path,) = tmp_path.iterdir()
         assert path.stat().st_size > 1000 and program._jitted._cache_size() == 0
+        written.append(path.stat().st_ino)
+    assert written[0] == written[1] != written[2]
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0], found[2])
