@@ -71,7 +71,8 @@ def map_chunks(
 
     Returns
     -------
-    The results of all columns, in one array each, with the batch in its shape.
+    The results of all columns, in one array each, with the batch in its shape: the function's own
+    where there is one chunk of just these columns, else NumPy's, which JAX takes without a copy.
     """
     size = math.prod(batch)
     host = [np.asarray(x) for x in arrays]
@@ -174,7 +175,7 @@ class _Results:
             array[start : start + len(part)] = np.asarray(part)[: self._size - start]
 
     def shaped(self, batch: tuple[int, ...]) -> Any:
-        arrays = jax.device_put([x.reshape((*batch, *x.shape[1:])) for x in self._arrays])
+        arrays = [x.reshape((*batch, *x.shape[1:])) for x in self._arrays]
         return jax.tree.unflatten(self._structure, arrays)
 
 

@@ -30,6 +30,7 @@ from . import _compiler
 from ._batching import announced
 from ._chunks import can_be_cut, map_chunks
 from ._kept import Kept
+from ._linear import contracted, joined
 
 Leaves = Sequence[Any]
 
@@ -89,7 +90,9 @@ def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     arrays = [x if isinstance(x, jax.Array) else jnp.asarray(x) for x in leaves]
     arrays = announced(arrays, math.prod(_batch_of(program, leaves)))
     found = _columns.bind(*arrays, program=program, what=what)
-    return jax.tree.unflatten(jax.tree.structure(_shapes(program, what, leaves)), found)
+    value = program.own_result(leaves)
+    like = value if what == "value" else (value, 0)
+    return jax.tree.unflatten(jax.tree.structure(like), found)
 
 
 _columns = Primitive("columns")
@@ -114,7 +117,7 @@ def _batch_of(program: Program, leaves: Leaves) -> tuple[int, ...]:
 
 
 def _shapes(program: Program, what: Any, leaves: Leaves) -> Any:
-    """Shapes of what is wanted of a program."""
+    """Shapes of what is wanted of a program, slopes `joined`."""
     axes, batch = program.own_axes, _batch_of(program, leaves)
     own = program.own_result(leaves)
 
@@ -125,12 +128,10 @@ def _shapes(program: Program, what: Any, leaves: Leaves) -> Any:
     if what == "value":
         return value
     count = sum(math.prod(x.shape) for x in jax.tree.leaves(own))
-    slopes = [
-        with_batch(x, count, *x.shape[x.ndim - n :])
-        for x, n, use in zip(leaves, axes, what, strict=True)
-        if use
-    ]
-    return value, slopes
+    some = [(x, n) for x, n, use in zip(leaves, axes, what, strict=True) if use]
+    number = sum(math.prod(x.shape[x.ndim - n :]) for x, n in some)
+    dtype = jnp.result_type(*(x.dtype for x, _ in some))
+    return value, jax.ShapeDtypeStruct((*batch, count, number), dtype)
 
 
 def _inlined(*leaves: Array, program: Program, what: Any) -> list[Array]:
@@ -153,12 +154,12 @@ def _jvp(primals: Leaves, tangents: Leaves, *, program: Program, what: Any) -> A
     wanted = tuple(_perturbs(x) for x in tangents)
     if not any(wanted):
         value = _bound(program, "value", primals)
-        change = jax.tree.map(jnp.zeros_like, value)
-    else:
-        value, slopes = _bound(program, wanted, primals)
-        axes = tuple(n for n, use in zip(program.own_axes, wanted, strict=True) if use)
-        change = _contracted(slopes, chosen(tangents, wanted), value, axes)
-    return jax.tree.leaves(value), jax.tree.leaves(change)
+        rows = jax.tree.leaves(value)
+        return rows, [jnp.zeros_like(x) for x in rows]
+    value, slopes = _bound(program, wanted, primals)
+    rows, axes = jax.tree.leaves(value), chosen(program.own_axes, wanted)
+    shapes = tuple(x.shape for x in rows)
+    return rows, contracted(slopes, chosen(tangents, wanted), axes, shapes)
 
 
 ad.primitive_jvps[_columns] = _jvp
@@ -200,23 +201,6 @@ def _perturbs(tangent: Any) -> bool:
     return not isinstance(tangent, ad.Zero) and tangent.dtype != jax.dtypes.float0
 
 
-@partial(jax.jit, static_argnums=3)
-def _contracted(slopes: Leaves, tangents: Leaves, value: Any, own_axes: tuple[int, ...]) -> Any:
-    """Slopes times tangents, summed over each column's own axes: linear, so JAX transposes it."""
-    rows: Any = 0
-    for slope, tangent, count in zip(slopes, tangents, own_axes, strict=True):
-        batch, own = tangent.shape[: tangent.ndim - count], tangent.shape[tangent.ndim - count :]
-        product = slope * tangent.reshape(*batch, 1, *own)
-        rows = rows + jnp.sum(product, axis=tuple(range(product.ndim - count, product.ndim)))
-    leaves, structure = jax.tree.flatten(value)
-    num_axes = rows.ndim - 1
-    counts = [math.prod(x.shape[num_axes:]) for x in leaves]
-    parts = jnp.split(rows, np.cumsum(counts)[:-1], axis=num_axes)
-    return jax.tree.unflatten(
-        structure, [part.reshape(x.shape) for part, x in zip(parts, leaves, strict=True)]
-    )
-
-
 def _fixed(program: Program, what: Any, leaves: Leaves) -> Program:
     """The program, with nothing left open."""
     traced = any(isinstance(x, Tracer) for x in leaves)
@@ -239,7 +223,12 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
         for x, n, each in zip(leaves, counts, own, strict=True)
     ]
     key = fixed, what
-    return map_chunks(partial(_alone(), key), key, flat, own, batch, fixed.widths(flat, what))
+    found = map_chunks(partial(_alone(), key), key, flat, own, batch, fixed.widths(flat, what))
+    if what == "value":
+        return jax.device_put(found)
+    # Slopes are read by `contracted` alone, which takes them as they are.
+    value, slopes = found
+    return jax.device_put(value), slopes
 
 
 def _flat(x: np.ndarray, own: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
@@ -248,11 +237,12 @@ def _flat(x: np.ndarray, own: tuple[int, ...], batch: tuple[int, ...]) -> np.nda
 
 
 def _wanted(of: tuple[Program, Any], leaves: Leaves) -> Any:
-    """The value, or the value and slopes in what is wanted."""
+    """The value, or the value and the slopes in what is wanted, `joined`."""
     program, what = of
     if what == "value":
         return program.value(leaves)
-    return program.value_and_slopes(leaves, what)
+    value, slopes = program.value_and_slopes(leaves, what)
+    return value, joined(slopes, chosen(program.own_axes, what))
 
 
 _inside = jax.jit(_wanted, static_argnums=0)

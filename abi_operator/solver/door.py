@@ -1,6 +1,7 @@
 """What the solver's doors share: from promoted arguments to a program for any number of columns."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import jax
@@ -91,7 +92,7 @@ class _Program(NamedTuple):
 
     @property
     def own_axes(self) -> tuple[int, ...]:
-        return tuple(len(own_axes(name, self.multiple_views)) for name in names(self.structure))
+        return _own_axes(self.structure, self.multiple_views)
 
     def known(self, leaves: Leaves, what: Any) -> "_Program":
         if what == "value" or self.options.num_doublings is not None:
@@ -118,8 +119,8 @@ class _Program(NamedTuple):
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         tile = tile_size(self.options.num_streams, leaves[0].dtype)
-        # Values at few streams are solved in hardly more time than a chunk needs to begin.
-        brief = what == "value" and self.options.num_streams <= 4
+        # At few streams a chunk is solved in few times what it needs to begin and to end.
+        brief = self.options.num_streams <= 8
         return (8, tile, 8 * tile, 16 * tile) if brief else (8, tile, 8 * tile)
 
     def value(self, leaves: Leaves) -> Any:
@@ -134,3 +135,8 @@ class _Program(NamedTuple):
 
     def value_and_slopes(self, leaves: Leaves, wanted: tuple[bool, ...]) -> tuple[Any, list[Any]]:
         return slopes_by_reverse_mode(self.value, leaves, wanted, self.own_axes)
+
+
+@cache
+def _own_axes(structure: Any, multiple_views: bool) -> tuple[int, ...]:
+    return tuple(len(own_axes(name, multiple_views)) for name in names(structure))

@@ -160,9 +160,10 @@ def test_what_was_written_is_read(monkeypatch, tmp_path):
         if content is not None:
             next(tmp_path.iterdir()).write_bytes(content)
         options = {"num_streams": 2, "num_modes": 1}
+        of_others = program._jitted._cache_size()  # those of a function share what they compile
         found.append(toa_brf(tau, np.full(2, 0.9), moments, 0.2, 0.6, 0.8, 0.5, **options))
         (path,) = tmp_path.iterdir()
-        assert path.stat().st_size > 1000 and program._jitted._cache_size() == 0
+        assert path.stat().st_size > 1000 and program._jitted._cache_size() == of_others
         written.append(path.stat().st_ino)
     assert written[0] == written[1] != written[2]
     np.testing.assert_array_equal(found[0], found[1])
