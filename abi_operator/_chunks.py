@@ -74,37 +74,93 @@ def map_chunks(
     The results of all columns, in one array each, with the batch in its shape: the function's own
     where there is one chunk of just these columns, else NumPy's, which JAX takes without a copy.
     """
-    size = math.prod(batch)
-    host = [np.asarray(x) for x in arrays]
-    chunks = cut(size, widths, usable_cores())
+    columns = _Columns(function, key, arrays, own, math.prod(batch))
+    chunks = cut(columns.size, widths, usable_cores())
     whole = len(chunks) == 1 and batch == (chunks[0][1],)
-    results = _Results(size)
-    x64 = jax.dtypes.canonicalize_dtype(np.float64) == np.float64
-    device = jax.local_devices()[0]
-    shapes = tuple(x.shape[each:] for x, each in zip(host, own, strict=True))
+    results = _Results(columns.size)
 
-    def solve(start: int, width: int) -> Any:
-        place = slice(start, start + width)
-        if start + width > size:
-            place = np.minimum(np.arange(start, start + width), size - 1)
-        some: list[Any] = [x[place] if each else x for x, each in zip(host, own, strict=True)]
-        # Settings of the caller's thread, not of this one.
-        tracing = nullcontext() if known(width) else _no_search_for_garbage()
-        with jax.enable_x64(x64), jax.default_device(device), tracing:
-            found = jax.block_until_ready(function(some))
-        return found if whole else results.put(start, found)
-
-    def known(width: int) -> bool:
-        return (key, shapes, width, x64) in _compiled
+    def solve(chunk: tuple[int, int]) -> Any:
+        found = jax.block_until_ready(columns.begin(*chunk))
+        return found if whole else results.put(chunk[0], found)
 
     # Never in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives, would
     # be part of what JAX knows a compiled program by.
     threads = _threads(os.getpid())
-    new = [c for c in _first_of_each(chunks) if not known(c[1])]
-    found = [threads.submit(solve, *c).result() for c in new]
-    _compiled.update((key, shapes, width, x64) for _, width in new)
-    found += threads.map(lambda c: solve(*c), [c for c in chunks if c not in new])
+    new = [c for c in _first_of_each(chunks) if not columns.known(c[1])]
+    found = [threads.submit(solve, c).result() for c in new]
+    found += threads.map(solve, [c for c in chunks if c not in new])
     return found[0] if whole else results.shaped(batch)
+
+
+def begin_chunks(
+    function: Callable[[list[Array]], Any],
+    key: Any,
+    arrays: Sequence[Any],
+    own: Sequence[bool],
+    batch: tuple[int, ...],
+    widths: Sequence[int],
+) -> tuple[tuple[int, ...], list[Any]] | None:
+    """Begin what `map_chunks` does, without waiting; None where cores have several chunks each.
+
+    Returns
+    -------
+    Number of columns that are to be taken of each chunk, from its first on, and the results of the
+    chunks, which may still be computed.
+    """
+    columns = _Columns(function, key, arrays, own, math.prod(batch))
+    chunks = cut(columns.size, widths, usable_cores())
+    lanes = _lanes(os.getpid())
+    if len(chunks) > len(lanes):
+        return None
+    known = columns.known(chunks[0][1])  # so few chunks have one width
+    begun = [lanes[0].submit(columns.begin, *chunks[0])]
+    if not known:
+        begun[0].result()  # it is compiled once
+    pairs = zip(lanes[1:], chunks[1:], strict=False)
+    begun += [lane.submit(columns.begin, *chunk) for lane, chunk in pairs]
+    ends = [start for start, _ in chunks[1:]] + [columns.size]
+    counts = tuple(end - start for (start, _), end in zip(chunks, ends, strict=True))
+    return counts, [x.result() for x in begun]
+
+
+class _Columns:
+    """Columns in memory, chunks of which a compiled function is called with."""
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        key: Any,
+        arrays: Sequence[Any],
+        own: Sequence[bool],
+        size: int,
+    ) -> None:
+        self._function, self._own, self.size = function, own, size
+        self._host = [np.asarray(x) for x in arrays]
+        shapes = tuple(x.shape[each:] for x, each in zip(self._host, own, strict=True))
+        self._x64 = jax.dtypes.canonicalize_dtype(np.float64) == np.float64
+        self._device = jax.local_devices()[0]
+        self._key = key, shapes, self._x64
+
+    def known(self, width: int) -> bool:
+        """Whether the function has been compiled for so many."""
+        return (*self._key, width) in _compiled
+
+    def begin(self, start: int, width: int) -> Any:
+        """Call the function with so many columns; those after the last are copies of it."""
+        end = start + width
+        place = slice(start, end)
+        if end > self.size:
+            place = np.minimum(np.arange(start, end), self.size - 1)
+        pairs = zip(self._host, self._own, strict=True)
+        some: list[Any] = [x[place] if each else x for x, each in pairs]
+        known = self.known(width)
+        # Settings of the caller's thread, not of this one.
+        settings = jax.enable_x64(self._x64), jax.default_device(self._device)
+        with settings[0], settings[1], nullcontext() if known else _no_search_for_garbage():
+            found = self._function(some)
+        if not known:
+            _compiled.add((*self._key, width))
+        return found
 
 
 def cut(size: int, widths: Sequence[int], num_cores: int) -> list[tuple[int, int]]:
@@ -155,6 +211,13 @@ def _no_search_for_garbage() -> Iterator[None]:
 def _threads(_process: int) -> ThreadPoolExecutor:
     """Threads of this process: one that was forked has none of its parent's."""
     return ThreadPoolExecutor(usable_cores(), thread_name_prefix="abi-operator")
+
+
+@cache
+def _lanes(_process: int) -> list[ThreadPoolExecutor]:
+    """The same, one by one: XLA runs what one thread has begun one after the other."""
+    name = "abi-operator-lane"
+    return [ThreadPoolExecutor(1, thread_name_prefix=name) for _ in range(usable_cores())]
 
 
 class _Results:

@@ -28,9 +28,9 @@ from jaxtyping import Array, Float
 
 from . import _compiler
 from ._batching import announced
-from ._chunks import can_be_cut, map_chunks
+from ._chunks import begin_chunks, can_be_cut, map_chunks
 from ._kept import Kept
-from ._linear import contracted, joined
+from ._linear import Slopes, assembled, contracted, joined
 
 Leaves = Sequence[Any]
 
@@ -156,7 +156,11 @@ def _jvp(primals: Leaves, tangents: Leaves, *, program: Program, what: Any) -> A
         value = _bound(program, "value", primals)
         rows = jax.tree.leaves(value)
         return rows, [jnp.zeros_like(x) for x in rows]
-    value, slopes = _bound(program, wanted, primals)
+    found = _begun(program, wanted, primals)
+    if found is None:
+        value, whole = _bound(program, wanted, primals)
+        found = value, Slopes([whole])
+    value, slopes = found
     rows, axes = jax.tree.leaves(value), chosen(program.own_axes, wanted)
     shapes = tuple(x.shape for x in rows)
     return rows, contracted(slopes, chosen(tangents, wanted), axes, shapes)
@@ -207,28 +211,61 @@ def _fixed(program: Program, what: Any, leaves: Leaves) -> Program:
     return program.unknown(what) if traced else program.known(leaves, what)
 
 
+def _begun(program: Program, what: Any, leaves: Leaves) -> tuple[Any, Slopes] | None:
+    """Value and slopes of columns with values, which may still be computed when it returns.
+
+    What JAX does with a derivative before anybody reads it takes as long as a hundred columns of 4
+    streams. None where cores have several chunks each, or columns cannot be read.
+    """
+    if any(isinstance(x, Tracer) for x in leaves):
+        return None
+    call = _in_memory(program, what, leaves)
+    begun = None if call is None else begin_chunks(**call)
+    if call is None or begun is None:
+        return None
+    counts, found = begun
+    values = [jax.tree.leaves(value) for value, _ in found]
+    rows = [assembled(list(x), counts, call["batch"]) for x in zip(*values, strict=True)]
+    value = jax.tree.unflatten(jax.tree.structure(found[0][0]), rows)
+    return value, Slopes([slopes for _, slopes in found], counts, call["batch"])
+
+
 def _call(program: Program, what: Any, leaves: Leaves) -> Any:
     """The program of columns with values, chunk by chunk where that can be."""
+    call = _in_memory(program, what, leaves)
+    if call is None:
+        return _inside((program.known(leaves, what), what), [jnp.asarray(x) for x in leaves])
+    found = map_chunks(**call)
+    if what == "value":
+        return jax.device_put(found)
+    # Slopes are read by `contracted` alone, which takes them as they are.
+    value, slopes = found
+    return jax.device_put(value), slopes
+
+
+def _in_memory(program: Program, what: Any, leaves: Leaves) -> dict[str, Any] | None:
+    """Arguments of `_chunks`, None where columns cannot be cut."""
     counts = [np.ndim(x) - own for x, own in zip(leaves, program.own_axes, strict=True)]
     shapes = [np.shape(x)[:n] for x, n in zip(leaves, counts, strict=True)]
     batch = np.broadcast_shapes(*shapes)
     size = math.prod(batch)
-    fixed = program.known(leaves, what)
     if size == 0 or not can_be_cut(leaves):
-        return _inside((fixed, what), [jnp.asarray(x) for x in leaves])
+        return None
     # Of one column alone, too, what is given without an axis is shared: the program is the same.
     own = [math.prod(shape) > 1 or size == 1 and len(shape) == len(batch) for shape in shapes]
     flat = [
         _flat(np.asarray(x), np.shape(x)[n:], batch if each else ())
         for x, n, each in zip(leaves, counts, own, strict=True)
     ]
-    key = fixed, what
-    found = map_chunks(partial(_alone(), key), key, flat, own, batch, fixed.widths(flat, what))
-    if what == "value":
-        return jax.device_put(found)
-    # Slopes are read by `contracted` alone, which takes them as they are.
-    value, slopes = found
-    return jax.device_put(value), slopes
+    fixed = program.known(leaves, what)
+    return {
+        "function": partial(_alone(), (fixed, what)),
+        "key": (fixed, what),
+        "arrays": flat,
+        "own": own,
+        "batch": batch,
+        "widths": fixed.widths(flat, what),
+    }
 
 
 def _flat(x: np.ndarray, own: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:

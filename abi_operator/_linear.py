@@ -8,7 +8,7 @@ linearised, staged and transposed one by one with every derivative that a script
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,8 +31,37 @@ def joined(slopes: Sequence[Float[Array, "..."]], own_axes: Sequence[int]) -> Fl
     return jnp.concatenate(flat, axis=-1)
 
 
+class Slopes(NamedTuple):
+    """Slopes of columns, `joined`, in one array ``*batch row number`` or in those of chunks.
+
+    Attributes
+    ----------
+    arrays
+        The one, or ``column row number`` of each chunk.
+    counts
+        Columns that are taken of each chunk, from its first on; empty for the one array.
+    batch
+        Shape of the batch of the columns of all chunks.
+    """
+
+    arrays: Sequence[Any]
+    counts: tuple[int, ...] = ()
+    batch: tuple[int, ...] = ()
+
+
+@partial(jax.jit, static_argnums=(1, 2))
+def assembled(
+    arrays: Sequence[Float[Array, "..."]], counts: tuple[int, ...], batch: tuple[int, ...]
+) -> Float[Array, "..."]:
+    """One array of chunks; see `Slopes`."""
+    if not counts:
+        return arrays[0]
+    columns = [x[:count] for x, count in zip(arrays, counts, strict=True)]
+    return jnp.concatenate(columns).reshape(*batch, *arrays[0].shape[1:])
+
+
 def contracted(
-    slopes: Float[Array, "..."],
+    slopes: Slopes,
     tangents: Sequence[Float[Array, "..."]],
     own_axes: Sequence[int],
     results: Shapes,
@@ -42,7 +71,7 @@ def contracted(
     Parameters
     ----------
     slopes
-        `joined`, of each row of a column's results in its own entries of each argument.
+        Of each row of a column's results in its own entries of each argument.
     tangents
         Of the arguments, ``*batch *own``, whose batches broadcast to that of the slopes.
     own_axes
@@ -55,13 +84,15 @@ def contracted(
     -------
     Tangents of the results.
     """
-    return _contracted.bind(slopes, *tangents, own_axes=tuple(own_axes), results=results)
+    arrays, *chunks = slopes
+    shapes = tuple(own_axes), results
+    return _contracted.bind(*arrays, *tangents, chunks=tuple(chunks), shapes=shapes)
 
 
-def _forward(
-    slopes: Array, *tangents: Array, own_axes: tuple[int, ...], results: Shapes
-) -> list[Array]:
-    pairs = list(zip(tangents, own_axes, strict=True))
+def _forward(*operands: Array, chunks: Any, shapes: tuple[tuple[int, ...], Shapes]) -> list[Array]:
+    own_axes, results = shapes
+    arrays, tangents = _apart(operands, own_axes)
+    slopes, pairs = assembled(arrays, *chunks), list(zip(tangents, own_axes, strict=True))
     numbers = [math.prod(x.shape[x.ndim - own :]) for x, own in pairs]
     rows: Any = 0
     for slope, (tangent, own), number in zip(_cut(slopes, numbers), pairs, numbers, strict=True):
@@ -72,11 +103,22 @@ def _forward(
     return [part.reshape(shape) for part, shape in zip(parts, results, strict=True)]
 
 
-@partial(jax.jit, static_argnums=(2, 3))
+def _apart(operands: Sequence[Any], own_axes: tuple[int, ...]) -> tuple[list[Any], list[Any]]:
+    """Arrays of slopes, and tangents."""
+    count = len(operands) - len(own_axes)
+    return list(operands[:count]), list(operands[count:])
+
+
+@partial(jax.jit, static_argnums=(2, 3, 4))
 def _backward(
-    slopes: Array, cotangents: Sequence[Array], own_axes: tuple[int, ...], arguments: Shapes
+    arrays: Sequence[Array],
+    cotangents: Sequence[Array],
+    chunks: Any,
+    own_axes: tuple[int, ...],
+    arguments: Shapes,
 ) -> list[Array]:
     """Cotangents of tangents, which have the shapes of the arguments."""
+    slopes = assembled(arrays, *chunks)
     batch = slopes.shape[:-2]
     counts = [math.prod(x.shape[len(batch) :]) for x in cotangents]
     pairs = zip(cotangents, counts, strict=True)
@@ -104,13 +146,13 @@ def _summed(full: Array, shape: tuple[int, ...], own: int) -> Array:
 
 _contracted = Primitive("slopes_times_tangents")
 _contracted.multiple_results = True
-_contracted.def_impl(jax.jit(_forward, static_argnames=("own_axes", "results")))
+_contracted.def_impl(jax.jit(_forward, static_argnames=("chunks", "shapes")))
 
 
 @_contracted.def_abstract_eval
-def _abstract_eval(*operands: Any, own_axes: tuple[int, ...], results: Shapes) -> list[ShapedArray]:
+def _abstract_eval(*operands: Any, chunks: Any, shapes: Any) -> list[ShapedArray]:
     dtype = jnp.result_type(*operands)
-    return [ShapedArray(shape, dtype) for shape in results]
+    return [ShapedArray(shape, dtype) for shape in shapes[1]]
 
 
 def _jvp(primals: Any, tangents: Any, **params: Any) -> Any:
@@ -118,15 +160,15 @@ def _jvp(primals: Any, tangents: Any, **params: Any) -> Any:
     return jax.jvp(partial(_forward, **params), tuple(primals), tuple(full))
 
 
-def _transpose(
-    cotangents: Any, slopes: Any, *tangents: Any, own_axes: tuple[int, ...], results: Shapes
-) -> list[Any]:
+def _transpose(cotangents: Any, *operands: Any, chunks: Any, shapes: Any) -> list[Any]:
     """Linear in tangents; slopes are known, for `_jvp` differentiates them by JAX's own rules."""
+    arrays, tangents = _apart(operands, shapes[0])
     unknown = [ad.is_undefined_primal(x) for x in tangents]
-    shapes = [x.aval if use else x for x, use in zip(tangents, unknown, strict=True)]
+    like = [x.aval if use else x for x, use in zip(tangents, unknown, strict=True)]
     full = [ad.instantiate_zeros(x) for x in cotangents]
-    found = _backward(slopes, full, own_axes, tuple(x.shape for x in shapes))
-    return [None, *(x if use else None for x, use in zip(found, unknown, strict=True))]
+    found = _backward(arrays, full, chunks, shapes[0], tuple(x.shape for x in like))
+    found = [x if use else None for x, use in zip(found, unknown, strict=True)]
+    return [None] * len(arrays) + found
 
 
 def _batch(operands: Any, axes: Any, **params: Any) -> Any:
