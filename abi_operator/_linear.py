@@ -117,24 +117,29 @@ def _backward(
     own_axes: tuple[int, ...],
     arguments: Shapes,
 ) -> list[Array]:
-    """Cotangents of tangents, which have the shapes of the arguments."""
-    slopes = assembled(arrays, *chunks)
-    batch = slopes.shape[:-2]
-    counts = [math.prod(x.shape[len(batch) :]) for x in cotangents]
-    pairs = zip(cotangents, counts, strict=True)
-    rows = jnp.concatenate([x.reshape(*batch, count) for x, count in pairs], axis=-1)
-    pulled = jnp.sum(slopes * rows[..., None], axis=-2)
+    """Cotangents of tangents, which have the shapes of the arguments.
+
+    Chunk by chunk, so that slopes are read once and what comes of them is written once.
+    """
+    counts, batch = chunks if chunks[0] else (None, arrays[0].shape[:-2])
+    size = math.prod(batch)
+    parts = [x.reshape(size, math.prod(x.shape[len(batch) :])) for x in cotangents]
+    rows = _cut(jnp.concatenate(parts, axis=-1), counts or [size], axis=0)
     given = list(zip(arguments, own_axes, strict=True))
-    parts = _cut(pulled, [math.prod(shape[len(shape) - own :]) for shape, own in given])
+    numbers = [math.prod(shape[len(shape) - own :]) for shape, own in given]
+    pulled = []
+    for slopes, weights in zip(arrays, rows, strict=True):
+        flat = slopes.reshape(math.prod(slopes.shape[:-2]), *slopes.shape[-2:])[: len(weights)]
+        pulled.append(_cut(jnp.sum(flat * weights[..., None], axis=1), numbers))
     return [
-        _summed(part.reshape(*batch, *shape[len(shape) - own :]), shape, own)
-        for part, (shape, own) in zip(parts, given, strict=True)
+        _summed(jnp.concatenate(x).reshape(*batch, *shape[len(shape) - own :]), shape, own)
+        for x, (shape, own) in zip(zip(*pulled, strict=True), given, strict=True)
     ]
 
 
-def _cut(x: Array, numbers: Sequence[int]) -> list[Array]:
-    """Parts of the last axis with so many entries each."""
-    return jnp.split(x, np.cumsum(numbers)[:-1], axis=-1)
+def _cut(x: Array, numbers: Sequence[int], axis: int = -1) -> list[Array]:
+    """Parts of an axis with so many entries each."""
+    return jnp.split(x, np.cumsum(numbers)[:-1], axis=axis)
 
 
 def _summed(full: Array, shape: tuple[int, ...], own: int) -> Array:
