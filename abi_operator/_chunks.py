@@ -102,6 +102,9 @@ def begin_chunks(
 ) -> tuple[tuple[int, ...], list[Any]] | None:
     """Begin what `map_chunks` does, without waiting; None where cores have several chunks each.
 
+    Columns are copied: JAX reads NumPy's arrays in their place, and what the caller writes there
+    while chunks are solved is none of their business.
+
     Returns
     -------
     Number of columns that are to be taken of each chunk, from its first on, and the results of the
@@ -113,11 +116,11 @@ def begin_chunks(
     if len(chunks) > len(lanes):
         return None
     known = columns.known(chunks[0][1])  # so few chunks have one width
-    begun = [lanes[0].submit(columns.begin, *chunks[0])]
+    begun = [lanes[0].submit(columns.begin, *chunks[0], copied=True)]
     if not known:
         begun[0].result()  # it is compiled once
     pairs = zip(lanes[1:], chunks[1:], strict=False)
-    begun += [lane.submit(columns.begin, *chunk) for lane, chunk in pairs]
+    begun += [lane.submit(columns.begin, *chunk, copied=True) for lane, chunk in pairs]
     ends = [start for start, _ in chunks[1:]] + [columns.size]
     counts = tuple(end - start for (start, _), end in zip(chunks, ends, strict=True))
     return counts, [x.result() for x in begun]
@@ -145,7 +148,7 @@ class _Columns:
         """Whether the function has been compiled for so many."""
         return (*self._key, width) in _compiled
 
-    def begin(self, start: int, width: int) -> Any:
+    def begin(self, start: int, width: int, copied: bool = False) -> Any:
         """Call the function with so many columns; those after the last are copies of it."""
         end = start + width
         place = slice(start, end)
@@ -153,6 +156,8 @@ class _Columns:
             place = np.minimum(np.arange(start, end), self.size - 1)
         pairs = zip(self._host, self._own, strict=True)
         some: list[Any] = [x[place] if each else x for x, each in pairs]
+        if copied:
+            some = [_copied(x) for x in some]
         known = self.known(width)
         # Settings of the caller's thread, not of this one.
         settings = jax.enable_x64(self._x64), jax.default_device(self._device)
@@ -240,6 +245,13 @@ class _Results:
     def shaped(self, batch: tuple[int, ...]) -> Any:
         arrays = [x.reshape((*batch, *x.shape[1:])) for x in self._arrays]
         return jax.tree.unflatten(self._structure, arrays)
+
+
+def _copied(x: np.ndarray) -> np.ndarray:
+    """A copy that JAX takes as it is."""
+    own = _aligned(x.shape, x.dtype)
+    own[...] = x
+    return own
 
 
 def _aligned(shape: tuple[int, ...], dtype: Any) -> np.ndarray:

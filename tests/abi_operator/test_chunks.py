@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator._chunks import cut, map_chunks
+from abi_operator._chunks import begin_chunks, cut, map_chunks
 from abi_operator.solver import toa_brf
 
 WIDTHS = 8, 64, 512
@@ -56,6 +56,25 @@ def test_the_batch_has_its_shape_again():
         lambda x: 2 * jnp.asarray(x[0]), "key", [np.arange(6.0)], [True], (2, 3), (4,)
     )
     np.testing.assert_array_equal(found, 2 * np.arange(6.0).reshape(2, 3))
+
+
+@pytest.mark.parametrize("size", [1, 8, 11, 64, 128])
+def test_what_is_begun_is_not_what_the_caller_goes_on_with(size):
+    x, seen = np.arange(2.0 * size).reshape(size, 2), []
+
+    def function(arrays):
+        seen.append(arrays)
+        return jnp.asarray(arrays[0]).sum(axis=1) + arrays[1][0]
+
+    shared = np.ones(1)
+    begun = begin_chunks(function, "begun", [x, shared], [True, False], (size,), (8, 64))
+    if begun is None:  # fewer cores than chunks
+        assert size > 64
+        return
+    counts, found = begun
+    columns = np.concatenate([np.asarray(part)[:n] for n, part in zip(counts, found, strict=True)])
+    np.testing.assert_array_equal(columns, x.sum(axis=1) + 1)
+    assert not any(np.shares_memory(a, b) for a in (x, shared) for some in seen for b in some)
 
 
 def arguments(size):
