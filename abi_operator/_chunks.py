@@ -7,6 +7,10 @@ and for no other number of columns, whatever comes; and nothing has to be set be
 The last chunk of a size begins where it must to end with the last column: some columns are solved
 twice, but none is copied. Fewer columns than the smallest chunk has are filled up with copies.
 
+Values are waited for. Slopes are not where there is a chunk for each core at most (`begin_chunks`):
+they are JAX's own results then, of programs that may still run. To put these together takes one
+more small program for every number of columns, which values do without.
+
 How they are compiled is settled in `_compiler`.
 """
 

@@ -30,9 +30,7 @@ from . import _compiler
 from ._batching import announced
 from ._chunks import begin_chunks, can_be_cut, map_chunks
 from ._kept import Kept
-from ._linear import Slopes, assembled, contracted, joined
-
-Leaves = Sequence[Any]
+from ._slopes import Leaves, Slopes, assembled, chosen, contracted, joined
 
 
 class Program(Protocol):
@@ -195,11 +193,6 @@ def _batch(leaves: Leaves, axes: Sequence[Any], *, program: Program, what: Any) 
 batching.primitive_batchers[_columns] = _batch
 
 
-def chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
-    """Items that are wanted."""
-    return [item for item, use in zip(items, wanted, strict=True) if use]
-
-
 def _perturbs(tangent: Any) -> bool:
     """Whether there is a derivative to take: not for constants, nor for integers."""
     return not isinstance(tangent, ad.Zero) and tangent.dtype != jax.dtypes.float0
@@ -215,7 +208,8 @@ def _begun(program: Program, what: Any, leaves: Leaves) -> tuple[Any, Slopes] | 
     """Value and slopes of columns with values, which may still be computed when it returns.
 
     What JAX does with a derivative before anybody reads it takes as long as a hundred columns of 4
-    streams. None where cores have several chunks each, or columns cannot be read.
+    streams, and is done meanwhile. None where cores have several chunks each, or columns cannot be
+    read.
     """
     if any(isinstance(x, Tracer) for x in leaves):
         return None
@@ -292,40 +286,3 @@ def _alone() -> Kept:
     JAX does not take these inside another `jax.jit`.
     """
     return Kept(_wanted, _compiler.options())
-
-
-def slopes_by_reverse_mode(
-    value: Any, leaves: Leaves, wanted: Sequence[bool], own_axes: Sequence[int]
-) -> tuple[Any, list[Float[Array, "..."]]]:
-    """Value and slopes of a function of leaves, in one sweep for all columns.
-
-    Those of other columns do not change a column's result, so that one pull gives all of them.
-    """
-    counts = [x.ndim - own for x, own in zip(leaves, own_axes, strict=True)]
-    batch = jnp.broadcast_shapes(*(x.shape[:n] for x, n in zip(leaves, counts, strict=True)))
-    full = [
-        jnp.broadcast_to(x, (*batch, *x.shape[n:])) if use else x
-        for x, n, use in zip(leaves, counts, wanted, strict=True)
-    ]
-
-    def of_wanted(some: Leaves) -> Any:
-        rest = iter(some)
-        return value([next(rest) if use else x for x, use in zip(full, wanted, strict=True)])
-
-    result, pull_back = jax.vjp(of_wanted, chosen(full, wanted))
-    outputs, structure = jax.tree.flatten(result)
-    shapes = [x.shape[len(batch) :] for x in outputs]
-    rows = np.eye(sum(math.prod(x) for x in shapes), dtype=outputs[0].dtype)
-
-    def slopes_of(row: Array) -> list[Array]:
-        parts = jnp.split(row, np.cumsum([math.prod(x) for x in shapes])[:-1])
-        seeds = [
-            jnp.broadcast_to(part.reshape(shape), x.shape)
-            for part, shape, x in zip(parts, shapes, outputs, strict=True)
-        ]
-        return pull_back(jax.tree.unflatten(structure, seeds))[0]
-
-    if len(rows) == 1:
-        return result, [jnp.expand_dims(x, len(batch)) for x in slopes_of(jnp.asarray(rows[0]))]
-    slopes = jax.vmap(slopes_of)(jnp.asarray(rows))
-    return result, [jnp.moveaxis(x, 0, len(batch)) for x in slopes]

@@ -14,7 +14,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._batching import map_tiles, on_every_device, tile_size
-from ._door import Leaves, chosen
+from ._door import Leaves
+from ._slopes import chosen
 from .atmosphere import State
 from .band_columns import BandColumns, columns_of_bands
 from .optics import num_terms

@@ -26,6 +26,7 @@ from rounds import AGREE, digits, table
 from abi_operator.solver import toa_brf
 
 STREAMS, COLUMNS = (4, 8, 16), 2048
+ROUNDS = 15  # after a pause a call of milliseconds takes half as long again every now and then
 SHARE = 0.9  # of the tuned rate
 JUDGED = {  # what the script calls: what it is beside
     "value": "value",

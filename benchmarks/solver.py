@@ -180,7 +180,7 @@ def main():
     parser.add_argument("--columns", type=int, help="default: 1,000, with --plain 2,048")
     parser.add_argument("--layers", type=int, default=20)
     parser.add_argument("--streams", type=int, nargs="+", help="default: 4 8 16, and 32")
-    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--repeats", type=int, help="default: 5, with --plain 15")
     parser.add_argument("--seconds", type=float, default=2.0, help="most of a slow peer's call")
     parser.add_argument("--truth", type=int, default=32, help="columns a round with 64 streams")
     parser.add_argument("--series", action="store_true", help="ours sums 129 moments as well")
@@ -190,6 +190,7 @@ def main():
     parser.add_argument("--largest", type=int, default=100_000, help="batch of the sweeps")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
+    options.repeats = options.repeats or (plain.ROUNDS if options.plain else 5)
     options.columns = options.columns or (plain.COLUMNS if options.plain else 1000)
     options.streams = options.streams or [*plain.STREAMS, *([] if options.plain else [32])]
     # A process that times plain calls leaves JAX alone: its children have one each.

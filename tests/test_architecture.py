@@ -27,6 +27,7 @@ FLOORS = [
         "_batching",
         "_kernels",
         "_processor",
+        "_slopes",
         "_numerics",
         "_version",
         "bands",

@@ -21,7 +21,7 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from .._batching import map_tiles
-from .._door import chosen
+from .._slopes import chosen
 
 Leaves = list[Float[Array, "*own batch"]]
 Slopes = list[Float[Array, "row *own batch"]]

@@ -8,7 +8,8 @@ import jax
 import jax.numpy as jnp
 
 from .._batching import tile_size
-from .._door import Leaves, enter, slopes_by_reverse_mode
+from .._door import Leaves, enter
+from .._slopes import slopes_by_reverse_mode
 from .checks import check_arguments
 from .column import (
     Column,

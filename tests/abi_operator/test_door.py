@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator._door import enter, slopes_by_reverse_mode
+from abi_operator._door import enter
+from abi_operator._slopes import slopes_by_reverse_mode
 
 OWN_AXES = (1, 0, 0)  # a row of each column, a number, an integer
 
@@ -73,6 +74,18 @@ TRANSFORMED = {
     "Hessian": (lambda f: jax.hessian(total(f), argnums=(0, 1)), ONE),
     "mapped Hessian": (lambda f: jax.vmap(jax.hessian(total(f), argnums=1)), GIVEN),
     "constants": (lambda f: jax.jacfwd(lambda t: f(*GIVEN)["sum"] * t), (2.0,)),
+    "forward of a batch": (
+        lambda f: lambda r, x, n: jax.jvp(lambda r: f(r, x, n), (r,), (r,)),
+        GIVEN,
+    ),
+    "in what columns share": (
+        lambda f: jax.grad(total(f), argnums=(0, 1)),
+        (GIVEN[0], ONE[1], GIVEN[2]),
+    ),
+    "in what rows of columns share": (
+        lambda f: jax.grad(total(f), argnums=(0, 1)),
+        (GIVEN[0], GIVEN[1][:4, None], GIVEN[2]),
+    ),
 }
 
 
