@@ -16,11 +16,8 @@ How they are compiled is settled in `_compiler`.
 
 import gc
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
-from functools import cache
 from threading import Lock
 from typing import Any
 
@@ -28,6 +25,7 @@ import jax
 import numpy as np
 from jaxtyping import Array
 
+from ._lanes import lanes, parted, threads
 from ._processor import usable_cores
 
 _ALIGNMENT = 64  # bytes
@@ -83,16 +81,20 @@ def map_chunks(
     whole = len(chunks) == 1 and batch == (chunks[0][1],)
     results = _Results(columns.size)
 
-    def solve(chunk: tuple[int, int]) -> Any:
-        found = jax.block_until_ready(columns.begin(*chunk))
+    def finish(chunk: tuple[int, int], found: Any) -> Any:
+        jax.block_until_ready(found)
         return found if whole else results.put(chunk[0], found)
 
-    # Never in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives, would
-    # be part of what JAX knows a compiled program by.
-    threads = _threads(os.getpid())
-    new = [c for c in _first_of_each(chunks) if not columns.known(c[1])]
-    found = [threads.submit(solve, c).result() for c in new]
-    found += threads.map(solve, [c for c in chunks if c not in new])
+    def solve(chunk: tuple[int, int]) -> Any:
+        return finish(chunk, columns.begin(chunk[1], columns.of(*chunk)))
+
+    if len(chunks) <= len(lanes()):
+        begun = _on_lanes(columns, chunks, columns.of)
+        found = [finish(*pair) for pair in zip(chunks, begun, strict=True)]
+    else:
+        new = [c for c in _first_of_each(chunks) if not columns.known(c[1])]
+        found = [threads().submit(solve, c).result() for c in new]
+        found += threads().map(solve, [c for c in chunks if c not in new])
     return found[0] if whole else results.shaped(batch)
 
 
@@ -116,18 +118,32 @@ def begin_chunks(
     """
     columns = _Columns(function, key, arrays, own, math.prod(batch))
     chunks = cut(columns.size, widths, usable_cores())
-    lanes = _lanes(os.getpid())
-    if len(chunks) > len(lanes):
+    if len(chunks) > len(lanes()):
         return None
-    known = columns.known(chunks[0][1])  # so few chunks have one width
-    begun = [lanes[0].submit(columns.begin, *chunks[0], copied=True)]
-    if not known:
-        begun[0].result()  # it is compiled once
-    pairs = zip(lanes[1:], chunks[1:], strict=False)
-    begun += [lane.submit(columns.begin, *chunk, copied=True) for lane, chunk in pairs]
+    found = _on_lanes(columns, chunks, lambda *chunk: _copied(columns.of(*chunk)))
     ends = [start for start, _ in chunks[1:]] + [columns.size]
     counts = tuple(end - start for (start, _), end in zip(chunks, ends, strict=True))
-    return counts, [x.result() for x in begun]
+    return counts, found
+
+
+def _on_lanes(
+    columns: "_Columns",
+    chunks: Sequence[tuple[int, int]],
+    given: Callable[[int, int], list[np.ndarray]],
+) -> list[Any]:
+    """Results of a chunk for each core at most, which may still be computed.
+
+    Never begun in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives,
+    would be part of what JAX knows a compiled program by.
+    """
+    begun: list[Any] = []
+    with parted():
+        for lane, chunk in zip(lanes(), chunks, strict=False):
+            known = columns.known(chunk[1])
+            begun.append(lane.submit(columns.begin, chunk[1], given(*chunk)))
+            if not known:
+                begun[-1].result()  # compiled once, for so few chunks have one width
+        return [x.result() for x in begun]
 
 
 class _Columns:
@@ -152,16 +168,17 @@ class _Columns:
         """Whether the function has been compiled for so many."""
         return (*self._key, width) in _compiled
 
-    def begin(self, start: int, width: int, copied: bool = False) -> Any:
-        """Call the function with so many columns; those after the last are copies of it."""
+    def of(self, start: int, width: int) -> list[np.ndarray]:
+        """Arrays of so many columns; those after the last are copies of it."""
         end = start + width
-        place = slice(start, end)
+        place: Any = slice(start, end)
         if end > self.size:
             place = np.minimum(np.arange(start, end), self.size - 1)
         pairs = zip(self._host, self._own, strict=True)
-        some: list[Any] = [x[place] if each else x for x, each in pairs]
-        if copied:
-            some = [_copied(x) for x in some]
+        return [x[place] if each else x for x, each in pairs]
+
+    def begin(self, width: int, some: list[np.ndarray]) -> Any:
+        """Call the function with arrays of so many columns."""
         known = self.known(width)
         # Settings of the caller's thread, not of this one.
         settings = jax.enable_x64(self._x64), jax.default_device(self._device)
@@ -216,19 +233,6 @@ def _no_search_for_garbage() -> Iterator[None]:
             gc.enable()
 
 
-@cache
-def _threads(_process: int) -> ThreadPoolExecutor:
-    """Threads of this process: one that was forked has none of its parent's."""
-    return ThreadPoolExecutor(usable_cores(), thread_name_prefix="abi-operator")
-
-
-@cache
-def _lanes(_process: int) -> list[ThreadPoolExecutor]:
-    """The same, one by one: XLA runs what one thread has begun one after the other."""
-    name = "abi-operator-lane"
-    return [ThreadPoolExecutor(1, thread_name_prefix=name) for _ in range(usable_cores())]
-
-
 class _Results:
     """Arrays of all columns, into which each chunk is copied by the thread that has solved it."""
 
@@ -251,11 +255,18 @@ class _Results:
         return jax.tree.unflatten(self._structure, arrays)
 
 
-def _copied(x: np.ndarray) -> np.ndarray:
-    """A copy that JAX takes as it is."""
-    own = _aligned(x.shape, x.dtype)
-    own[...] = x
-    return own
+def _copied(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Copies that JAX takes as they are, in one piece of memory, which takes half the time."""
+    places, first = [], 0
+    for x in arrays:
+        places.append(slice(first, first + x.nbytes))
+        first += -(-x.nbytes // _ALIGNMENT) * _ALIGNMENT
+    memory = _aligned((first,), np.dtype(np.uint8))
+    pairs = zip(arrays, places, strict=True)
+    copies = [memory[place].view(x.dtype).reshape(x.shape) for x, place in pairs]
+    for own, x in zip(copies, arrays, strict=True):
+        own[...] = x
+    return copies
 
 
 def _aligned(shape: tuple[int, ...], dtype: Any) -> np.ndarray:

@@ -15,13 +15,13 @@ all transformations are done is traced inside, once, as it is compiled: `jax.cus
 
 import math
 from collections.abc import Sequence
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import Any, Protocol, Self
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import ShapedArray, Tracer
+from jax.core import ShapedArray, Tracer, eval_context
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Float
@@ -219,7 +219,8 @@ def _begun(program: Program, what: Any, leaves: Leaves) -> tuple[Any, Slopes] | 
         return None
     counts, found = begun
     values = [jax.tree.leaves(value) for value, _ in found]
-    rows = [assembled(list(x), counts, call["batch"]) for x in zip(*values, strict=True)]
+    with eval_context():  # in the midst of a derivative a call takes ten times as long
+        rows = [assembled(list(x), counts, call["batch"]) for x in zip(*values, strict=True)]
     value = jax.tree.unflatten(jax.tree.structure(found[0][0]), rows)
     return value, Slopes([slopes for _, slopes in found], counts, call["batch"])
 
@@ -239,17 +240,12 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
 
 def _in_memory(program: Program, what: Any, leaves: Leaves) -> dict[str, Any] | None:
     """Arguments of `_chunks`, None where columns cannot be cut."""
-    counts = [np.ndim(x) - own for x, own in zip(leaves, program.own_axes, strict=True)]
-    shapes = [np.shape(x)[:n] for x, n in zip(leaves, counts, strict=True)]
-    batch = np.broadcast_shapes(*shapes)
-    size = math.prod(batch)
-    if size == 0 or not can_be_cut(leaves):
+    batch, own = _layout(program.own_axes, tuple(np.shape(x) for x in leaves))
+    if math.prod(batch) == 0 or not can_be_cut(leaves):
         return None
-    # Of one column alone, too, what is given without an axis is shared: the program is the same.
-    own = [math.prod(shape) > 1 or size == 1 and len(shape) == len(batch) for shape in shapes]
     flat = [
-        _flat(np.asarray(x), np.shape(x)[n:], batch if each else ())
-        for x, n, each in zip(leaves, counts, own, strict=True)
+        _flat(np.asarray(x), number, batch if each else ())
+        for x, number, each in zip(leaves, program.own_axes, own, strict=True)
     ]
     fixed = program.known(leaves, what)
     return {
@@ -262,9 +258,27 @@ def _in_memory(program: Program, what: Any, leaves: Leaves) -> dict[str, Any] | 
     }
 
 
-def _flat(x: np.ndarray, own: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
+@lru_cache(1024)
+def _layout(
+    own_axes: tuple[int, ...], shapes: tuple[tuple[int, ...], ...]
+) -> tuple[tuple[int, ...], tuple[bool, ...]]:
+    """Shape of the batch, and which arguments have an entry for each column.
+
+    Of one column alone, too, what is given without an axis is shared: the program is the same.
+    """
+    outer = [x[: len(x) - own] for x, own in zip(shapes, own_axes, strict=True)]
+    batch = np.broadcast_shapes(*outer)
+    one = math.prod(batch) == 1
+    return batch, tuple(math.prod(x) > 1 or one and len(x) == len(batch) for x in outer)
+
+
+def _flat(x: np.ndarray, own_axes: int, batch: tuple[int, ...]) -> np.ndarray:
     """The same with one axis for the batch, a view where it can be."""
-    return np.broadcast_to(x, (*batch, *own)).reshape(-1, *own) if batch else x.reshape(1, *own)
+    own = x.shape[x.ndim - own_axes :]
+    full = (*batch, *own)
+    if len(batch) == 1 and x.shape == full:
+        return x
+    return np.broadcast_to(x, full).reshape(-1, *own) if batch else x.reshape(1, *own)
 
 
 def _wanted(of: tuple[Program, Any], leaves: Leaves) -> Any:

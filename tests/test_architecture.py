@@ -22,6 +22,7 @@ FLOORS = [
     {"geometry", "planck"},
     {"satellites", "_door", "_elimination"},
     {"_chunks", "speed"},
+    {"_lanes"},
     {"_compiler", "_kept"},
     {
         "_batching",

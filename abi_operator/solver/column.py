@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import jax
@@ -84,15 +84,23 @@ def promoted(**arguments: Any) -> Column:
 
 def check_shapes(column: Column, num_moments: int, multiple_views: bool) -> None:
     """Refuse arguments whose own axes are missing or disagree, or whose others do not broadcast."""
+    shapes = tuple((name, leaf.shape) for name, leaf in _leaves(column))
+    _check_these(shapes, num_moments, multiple_views)
+
+
+@lru_cache(1024)  # calls with columns of the same shapes follow each other
+def _check_these(
+    shapes: tuple[tuple[str, tuple[int, ...]], ...], num_moments: int, multiple_views: bool
+) -> None:
     leading, sizes = [], {}
-    for name, leaf in _leaves(column):
+    for name, shape in shapes:
         axes = own_axes(name, multiple_views)
-        if leaf.ndim < len(axes):
+        if len(shape) < len(axes):
             needs = " and a ".join(f"{axis} axis" for axis in axes)
-            raise ValueError(f"{name} needs a {needs}; got shape {leaf.shape}.")
-        split = leaf.ndim - len(axes)
-        leading.append((name, leaf.shape[:split]))
-        for axis, size in zip(axes, leaf.shape[split:], strict=True):
+            raise ValueError(f"{name} needs a {needs}; got shape {shape}.")
+        split = len(shape) - len(axes)
+        leading.append((name, shape[:split]))
+        for axis, size in zip(axes, shape[split:], strict=True):
             sizes.setdefault(axis, []).append((name, size))
     if "level" in sizes:
         name, levels = sizes.pop("level")[0]
@@ -115,7 +123,7 @@ def check_shapes(column: Column, num_moments: int, multiple_views: bool) -> None
         raise ValueError(
             f"this many streams need at least {num_moments} moments a layer (num_streams + 1 with "
             f"delta-M, num_streams without); got {given} in moments of shape "
-            f"{column.moments.shape}. Pad Rayleigh with zeros."
+            f"{dict(shapes)['moments']}. Pad Rayleigh with zeros."
         )
     try:
         np.broadcast_shapes(*(shape for _, shape in leading))
