@@ -100,6 +100,7 @@ _TAKEN_AS_THEY_ARE = (
 )
 
 _ADVICE = "give a WRF output file (wrfout_*) that holds them"
+_FORMAT_ADVICE = "give a WRF output file (wrfout_*) in NetCDF"
 
 
 def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
@@ -121,7 +122,7 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
         not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
         fewer) and ``moving_nest`` (1 where positions differ from time to time, else 0).
     """
-    with open_netcdf(path) as file:
+    with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
         times = _times(file, path)
         place = {"time": time, "rows": slice(None), "path": path}
@@ -160,7 +161,7 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
         Variables of `abi_operator.nomenclature.MODEL`, float64, dimensions ``layer y x`` and
         ``level y x``, top first, with the scalar coordinate ``time``.
     """
-    with open_netcdf(path) as file:
+    with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
         times = _times(file, path)
         place = {"time": time, "rows": rows, "path": path}
