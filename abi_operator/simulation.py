@@ -41,6 +41,7 @@ from .scene import (
     completion_heights,
     highest_top,
     nearest_standard_atmosphere,
+    negative_lines,
     row_blocks,
     run,
     scenario,
@@ -303,3 +304,4 @@ def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
         share = 100 * float(account["unsimulated_condensate_share"])
         kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")
         yield f"{share:.2g} % of the condensate's mass: not simulated ({kinds})"
+    yield from negative_lines(account)

@@ -7,6 +7,7 @@ reflectances, and `run` does so for scenes that do not fit into memory. No file 
 """
 
 from .account import add_accounts as add_accounts
+from .account import negative_lines as negative_lines
 from .albedo import check_ground as check_ground
 from .angles import SATELLITE_LONGITUDE as SATELLITE_LONGITUDE
 from .column_air import completion_heights as completion_heights

@@ -13,7 +13,13 @@ from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import ALL_GASES
 from ..radiance import THERMAL
 from ..satellites import SATELLITES, gas_fit_covers
-from .account import condensate_account, condensate_warnings, model_attributes, pressure_range
+from .account import (
+    condensate_account,
+    condensate_warnings,
+    model_attributes,
+    negative_account,
+    pressure_range,
+)
 from .albedo import surface_albedo
 from .angles import SATELLITE_LONGITUDE, angle_flags, find_angles
 from .checks import check_scenario
@@ -161,6 +167,7 @@ def scenario(
         | ground_sources
         | pressure_range(top_pressure)
         | condensate_account(condensate)
+        | negative_account(model)
     )
 
 
