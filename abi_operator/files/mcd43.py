@@ -8,10 +8,12 @@ import numpy as np
 import xarray as xr
 
 from ..bands import check_bands
+from ..nomenclature import MODEL
 from ..surface.modis_to_abi import MODIS_TO_ABI, BandRegression
 from ..surface.ross_li import WHITE_SKY
 from .errors import InputError
 from .netcdf import FilePath, cf_attributes, load, open_netcdf, require_dims, require_variables
+from .plausible import check_values, plausible
 
 VARIABLE_MAP = {
     "BRDF_Albedo_Parameters_": "surface_albedo",
@@ -254,6 +256,10 @@ def _axis(file: xr.Dataset, name: str, path: FilePath) -> xr.DataArray:
     if not np.isfinite(values).all() or not ((steps > 0).all() or (steps < 0).all()):
         raise InputError(f"{name} in {path} is not monotonic; give the file as AppEEARS wrote it.")
     ours = {"lat": "latitude", "lon": "longitude"}[name]
+    units = MODEL[ours].units
+    check_values(
+        values, plausible(ours), units, f"{name} in {path}", lambda index: f"{name}={index[0]}"
+    )
     return xr.DataArray(values, dims=(name,), attrs=cf_attributes(ours))
 
 

@@ -131,6 +131,12 @@ def test_broadband_is_suggested_only_where_it_helps(write_albedo_twin, held, ban
         read_mcd43a1(path, bands)
 
 
+def test_a_latitude_that_is_none_is_refused(write_albedo_twin):
+    path = write_albedo_twin({"Band3": weights(100)}, latitude=(34.0, -999.0))
+    with pytest.raises(InputError, match="lat in .* is -999 degrees_north at lat=1 .* -90 to 90"):
+        read_mcd43a1(path, ["C01"])
+
+
 @pytest.mark.parametrize("named", [True, False])
 def test_the_projection_of_modis_itself_is_called_by_name(tmp_path, named):
     path = tmp_path / "MCD43A1.nc"

@@ -21,8 +21,8 @@ GROUND = {
     "RE_CLOUD": (LAYERS, np.full((2, 4, 3, 2), 1e-5, np.float32)),
     "QNICE": (LAYERS, np.full((2, 4, 3, 2), 1e4, np.float32)),
 }
-PLACE = r"at Time=1, bottom_top=2, south_north=1, west_east=0 \(so are 1 of the 24 values read\)"
-GROUND_PLACE = r"at Time=1, south_north=1, west_east=0 \(so are 1 of the 6 values read\)"
+PLACE = r"at Time=1, bottom_top=2, south_north=1, west_east=0 \(1 of the 24 values read\)"
+GROUND_PLACE = r"at Time=1, south_north=1, west_east=0 \(1 of the 6 values read\)"
 
 
 @pytest.fixture
@@ -82,7 +82,9 @@ def test_so_is_the_ground(spoiled, name):
 
 @pytest.mark.parametrize(("value", "words"), [(np.nan, "is missing"), (np.inf, "is infinite")])
 def test_what_is_not_finite_is_called_so(spoiled, value, words):
-    with pytest.raises(InputError, match=f"QVAPOR in .* {words} .*{PLACE}; repair it, or cut"):
+    with pytest.raises(
+        InputError, match=f"QVAPOR in .* {words} .*{PLACE}; repair it, or leave it out"
+    ):
         read_wrf(spoiled("QVAPOR", value), 1)
 
 
@@ -139,7 +141,7 @@ def test_a_land_mask_that_counts_from_one_has_its_own_range(spoiled, write_wrf_t
 
 
 def test_rows_are_counted_in_the_file(spoiled):
-    with pytest.raises(InputError, match="south_north=1, west_east=0 .so are 1 of the 8 values"):
+    with pytest.raises(InputError, match="south_north=1, west_east=0 .1 of the 8 values"):
         read_wrf(spoiled("QCLOUD", 5), 1, slice(1, 2))
 
 
