@@ -111,6 +111,7 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
     with netCDF4.Dataset(inputs.wrf, "a") as file:
         file["QICE"][0, 20, :3, :3] = 1e-5
         file["QRAIN"][0, 2, 5:, 5:] = 1e-4
+        file["QSNOW"][0, 2, 0, :2] = -1e-9, -2e-9
     options = ["--albedo", inputs.albedo, "--ocean-albedo", 0.03, "--num-streams", 2]
     options += ["--bands", "C04,C07", "--emissivity", "open shrubland", "--satellite", "GOES-18"]
     options += ["--hydrometeors", "ice", "--microphysics", "wsm6", "--time", 0]
@@ -124,12 +125,15 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         "emissivity of the ground in C07: 0.89 (open shrubland) over land, 0.978 over water",
         "temperature of the ground: the model's",
         "not simulated (rain)",
+        "snow mixing ratio below 0, taken as 0: in 2 cells, down to -2e-09 kg kg-1",
     ):
         assert line in outcome.output
     assert sorted(x.name for x in out.iterdir()) == ["C07_2007-10-23T180000.png", "result.nc"]
     with read_result(out / "result.nc") as result:
         assert result.attrs["satellite"] == "GOES-18"
         assert result.attrs["hydrometeors"] == "cloud; ice"
+        assert result.attrs["negative_snow_mixing_ratio_count"] == 2
+        assert result.attrs["smallest_negative_snow_mixing_ratio"] == pytest.approx(-2e-9)
         ice = result["ice_optical_depth"].sel(band="C04").values[0] > 0
         assert ice[:3, :3].all() and ice.sum() == 9
         vapour_hides = result["brf"].sel(band="C04").values[0] < 0.1
@@ -151,6 +155,12 @@ def shift(path, degrees):
         file["lon"][:] += degrees
 
 
+def fill(path, name, value):
+    """Put a value into all places of a variable."""
+    with netCDF4.Dataset(path, "a") as file:
+        file[name][:] = value
+
+
 def shrink(path):
     """Make a picture smaller than the grid."""
     Image.new("L", (SIZE - 1, SIZE)).save(path)
@@ -163,6 +173,11 @@ def shrink(path):
         (lambda inputs: inputs.albedo.unlink(), "does not exist"),
         (lambda inputs: inputs.plume.unlink(), "does not exist"),
         (lambda inputs: inputs.wrf.write_text("no NetCDF"), "cannot be read as NetCDF"),
+        (lambda inputs: os.truncate(inputs.wrf, 100_000), "ends after 100000 of the "),
+        (lambda inputs: os.truncate(inputs.albedo, 90_000), "ends after 90000 of the "),
+        (lambda inputs: inputs.albedo.write_bytes(b"\x0e\x03\x13\x01"), "is an HDF4 file, not N"),
+        (lambda inputs: fill(inputs.wrf, "TSK", 9.96921e36), "was never written"),
+        (lambda inputs: fill(inputs.wrf, "QCLOUD", 1e20), "plausible is 0 to 0.03 kg kg-1"),
         (lambda inputs: without(inputs.wrf, "QCLOUD"), "has no QCLOUD"),
         (
             lambda inputs: without(inputs.albedo, "BRDF_Albedo_Parameters_Band3"),
