@@ -24,9 +24,9 @@ def surface_albedo(
     """Albedo by band (band, y, x), NaN where there is none [-]; and attributes that say whence.
 
     In C07 it is 1 - `emissivity` (`thermal_albedo`). In the other bands it is that of the cell of
-    the albedo file that is nearest in time and then in space; over water of the model's land mask
-    `ocean_albedo`. Without a land mask, `ocean_albedo` fills what the file leaves missing in all of
-    the bands.
+    the albedo file that is nearest in time, the day's own first, and then in space; over water of
+    the model's land mask `ocean_albedo`. Without a land mask, `ocean_albedo` fills what the file
+    leaves missing in all of the bands.
 
     Parameters
     ----------
@@ -142,12 +142,19 @@ def _water(dataset: xr.Dataset) -> np.ndarray | None:
 
 
 def _nearest_time(albedo: xr.Dataset, time: np.datetime64 | np.ndarray) -> xr.DataArray:
-    """Albedo at the date that is nearest to `time`; warn where that is far away."""
-    away = np.abs(albedo["time"].values - time) / np.timedelta64(1, "D")
-    nearest = albedo["surface_albedo"].isel(time=int(np.argmin(away)))
-    if away.min() > _FARTHEST:
+    """Albedo of the day of `time`, or else of the nearest; warn where that is far away.
+
+    A date of MODIS's albedo is a day, in the middle of the 16 from which it is made, and so not the
+    midnight at which it begins. Of two days that are equally far the one nearer to `time` is taken.
+    """
+    days = albedo["time"].values.astype("datetime64[D]")
+    away = np.abs(days - np.asarray(time).astype("datetime64[D]")) / np.timedelta64(1, "D")
+    noons = days.astype("datetime64[ns]") + np.timedelta64(12, "h")
+    best = np.lexsort((np.abs(noons - time), away))[0]
+    nearest = albedo["surface_albedo"].isel(time=int(best))
+    if away[best] > _FARTHEST:
         warnings.warn(
-            f"the nearest date of the albedo file, {_date(nearest)}, is {away.min():.0f} days away "
+            f"the nearest date of the albedo file, {_date(nearest)}, is {away[best]:.0f} days away "
             "from the scene.",
             UserWarning,
             stacklevel=2,

@@ -37,8 +37,28 @@ def test_the_nearest_date_is_taken(make_model, make_albedo):
     assert (values < 0.5).all()
 
 
+@pytest.mark.parametrize("hour", ["00:00", "11:59", "12:01", "18:00", "23:59"])
+def test_the_days_own_value_comes_first(make_model, make_albedo, hour):
+    albedo = make_albedo(dates=("2007-10-22", "2007-10-24", "2007-10-23"))
+    albedo["surface_albedo"][:, 2] = 0.9
+    model = make_model().assign_coords(time=np.datetime64(f"2007-10-23T{hour}", "ns"))
+    values, source = surface_albedo(model, BANDS, albedo, None)
+    assert (values == 0.9).all()
+    assert source["surface_albedo_source"].endswith("2007-10-23")
+
+
+@pytest.mark.parametrize(("hour", "expected"), [("06:00", "2007-10-22"), ("18:00", "2007-10-24")])
+def test_of_two_days_equally_far_the_nearer_in_hours_is_taken(
+    make_model, make_albedo, hour, expected
+):
+    model = make_model().assign_coords(time=np.datetime64(f"2007-10-23T{hour}", "ns"))
+    albedo = make_albedo(dates=("2007-10-24", "2007-10-22"))
+    _, source = surface_albedo(model, BANDS, albedo, None)
+    assert source["surface_albedo_source"].endswith(expected)
+
+
 def test_a_date_far_away_is_warned_of(make_model, make_albedo):
-    with pytest.warns(UserWarning, match="2007-10-01, is 23 days away from the scene"):
+    with pytest.warns(UserWarning, match="2007-10-01, is 22 days away from the scene"):
         surface_albedo(make_model(), BANDS, make_albedo(dates=("2007-10-01",)), None)
 
 
