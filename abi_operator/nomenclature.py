@@ -42,6 +42,12 @@ HYDROMETEORS: dict[str, str] = {
 MODEL: dict[str, Variable] = {
     "latitude": Variable(HORIZONTAL, "degrees_north", "latitude", "latitude"),
     "longitude": Variable(HORIZONTAL, "degrees_east", "longitude", "longitude"),
+    "latitude_bounds": Variable(
+        (*HORIZONTAL, "corner"), "degrees_north", "latitude of the cells' corners"
+    ),
+    "longitude_bounds": Variable(
+        (*HORIZONTAL, "corner"), "degrees_east", "longitude of the cells' corners"
+    ),
     "layer_pressure": Variable(("layer", "y", "x"), "Pa", "pressure at mid-layer", "air_pressure"),
     "surface_pressure": Variable(
         HORIZONTAL, "Pa", "pressure at the ground", "surface_air_pressure"

@@ -9,6 +9,7 @@ import xarray as xr
 
 from ..constants import GRAVITY, KAPPA
 from ..nomenclature import MODEL
+from .cell_bounds import cell_bounds
 from .errors import InputError
 from .netcdf import (
     FilePath,
@@ -156,7 +157,8 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
     -------
     xarray.Dataset
         Variables of `abi_operator.nomenclature.MODEL`, float64, dimensions ``layer y x`` and
-        ``level y x``, top first, with the scalar coordinate ``time``.
+        ``level y x``, top first, with the scalar coordinate ``time`` and the corners of cells,
+        which those of a block share with the rows beside it.
     """
     with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
@@ -182,7 +184,7 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
             "time": times[time],
             "latitude": _field(file, "XLAT", **place),
             "longitude": _field(file, "XLONG", **place),
-        }
+        } | _bounds(file, **place)
         attributes = _attributes(file)
     dataset = xr.Dataset({n: _finish(f, n) for n, f in fields.items()}, coords, attributes)
     _check_columns(dataset, path)
@@ -211,6 +213,25 @@ def _field(file: xr.Dataset, name: str, *, time: int, rows: slice, path: FilePat
 
 def _check_sum(array: xr.DataArray, ours: str, *, time: int, rows: slice, path: FilePath) -> None:
     check_block(array.values, ours, SUMS[ours], time=time, rows=rows, path=path)
+
+
+def _bounds(file: xr.Dataset, *, time: int, rows: slice, path: FilePath) -> dict[str, xr.DataArray]:
+    """Corners of the cells of some rows, from the columns' places in them and in the rows beside.
+
+    None for a single row or line of columns, of which nothing tells how wide it is.
+    """
+    start, stop, _ = rows.indices(file.sizes["south_north"])
+    first = max(start - 1, 0)
+    place = {"time": time, "rows": slice(first, stop + 1), "path": path}
+    latitude, longitude = (_field(file, name, **place).values for name in ("XLAT", "XLONG"))
+    if min(latitude.shape) < 2:
+        return {}
+    names = "latitude_bounds", "longitude_bounds"
+    corners = (x[start - first :][: stop - start] for x in cell_bounds(latitude, longitude))
+    return {
+        name: xr.DataArray(values, dims=MODEL[name].dims, attrs=cf_attributes(name))
+        for name, values in zip(names, corners, strict=True)
+    }
 
 
 def _land_mask(file: xr.Dataset, *, time: int, rows: slice, path: FilePath) -> xr.DataArray | None:

@@ -64,9 +64,12 @@ def test_variables_are_as_the_nomenclature_says(write_wrf_twin):
 
 def test_a_block_of_rows_is_the_same_as_those_rows_of_the_whole(write_wrf_twin):
     path = write_wrf_twin()
-    whole, block = read_wrf(path, 0), read_wrf(path, 0, slice(1, 3))
-    for name in whole.data_vars:
-        np.testing.assert_array_equal(block[name], whole[name].isel(y=slice(1, 3)))
+    whole = read_wrf(path, 0)
+    for rows in (slice(1, 3), slice(0, 1), slice(1, 2), slice(2, 3)):
+        block = read_wrf(path, 0, rows)
+        assert set(block.variables) == set(whole.variables)
+        for name in {*whole.variables} - {"time"}:
+            np.testing.assert_array_equal(block[name], whole[name].isel(y=rows), err_msg=name)
 
 
 def test_attributes_tell_of_the_run(write_wrf_twin):

@@ -6,6 +6,7 @@ import pytest
 from abi_operator.files import InputError
 from abi_operator.scene import check_ground
 from abi_operator.scene.albedo import surface_albedo
+from abi_operator.scene.albedo_file import albedo_of_file
 
 BANDS = ("C01", "C03")
 
@@ -14,7 +15,62 @@ def test_the_nearest_cell_is_taken(make_model, make_albedo):
     values, source = surface_albedo(make_model(), BANDS, make_albedo(), None)
     np.testing.assert_allclose(values[0], [[0.2, 0.3]] * 3)
     np.testing.assert_allclose(values[1], [[0.22, 0.32]] * 3)
-    assert source == {"surface_albedo_source": "nearest cell of the albedo file's 2007-10-24"}
+    assert source["surface_albedo_source"] == "nearest cell of the albedo file's 2007-10-24"
+    assert (source["mean_albedo_count"], source["nearest_albedo_count"]) == (0, 6)
+
+
+def fine_albedo(make_albedo, step=0.02):
+    """Random albedo in cells of a fiftieth of a degree, a fifth of the model's."""
+    made = make_albedo(
+        lat=np.arange(33.4, 32.8, -step), lon=np.arange(-117.2, -116.8, step), dates=("2007-10-23",)
+    )
+    values = np.random.default_rng(2).uniform(0.05, 0.5, made["surface_albedo"].shape)
+    return made.assign(surface_albedo=(made["surface_albedo"].dims, values))
+
+
+def test_larger_cells_have_the_mean_over_their_area(make_model, make_albedo):
+    model, albedo = make_model(), fine_albedo(make_albedo)
+    values, source = surface_albedo(model, BANDS, albedo, None)
+    field = albedo["surface_albedo"].isel(time=0)
+    for y, x in np.ndindex(3, 2):
+        place = model["latitude"].values[y, x], model["longitude"].values[y, x]
+        within = field.where(
+            (abs(field.lat - place[0]) < 0.05) & (abs(field.lon - place[1]) < 0.05), drop=True
+        )
+        assert within.sizes["lat"] == within.sizes["lon"] == 5
+        np.testing.assert_allclose(values[:, y, x], within.mean(("lat", "lon"))[[0, 2]], rtol=1e-12)
+    expected = "mean of the albedo file's 2007-10-23 over each column's cell"
+    assert source["surface_albedo_source"] == expected
+    assert source["mean_albedo_count"] == 6 and source["incomplete_mean_albedo_count"] == 0
+
+
+def test_the_count_of_longitudes_does_not_matter_to_means(make_model, make_albedo):
+    model, albedo = make_model(), fine_albedo(make_albedo)
+    expected, _ = surface_albedo(model, BANDS, albedo, None)
+    turned = albedo.assign_coords(lon=albedo.lon + 360)
+    np.testing.assert_allclose(surface_albedo(model, BANDS, turned, None)[0], expected, rtol=1e-12)
+
+
+def test_means_with_holes_are_counted_and_those_mostly_of_holes_are_none(make_model, make_albedo):
+    model, albedo = make_model(), fine_albedo(make_albedo)
+    field = albedo["surface_albedo"]
+    field[0, 0] = field[0, 0].where(field.lat < 33.17)  # two fifths of the last row's cells
+    values, source = surface_albedo(model, BANDS, albedo, None)
+    assert np.isnan(values[0, 2]).all() and np.isfinite(values[0, :2]).all()
+    assert np.isfinite(values[1]).all()
+    assert source["incomplete_mean_albedo_count"] == 2
+    _, of_land = surface_albedo(model, BANDS, albedo, 0.06)
+    assert of_land["incomplete_mean_albedo_count"] == 1 and of_land["mean_albedo_count"] == 3
+
+
+def test_a_single_row_of_columns_or_of_cells_has_no_size(make_model, make_albedo):
+    model, albedo = make_model().isel(y=[1]), fine_albedo(make_albedo)
+    _, source = surface_albedo(model, BANDS, albedo, None)
+    assert source["surface_albedo_source"].startswith("nearest cell")
+    for axis in ("lat", "lon"):
+        one = make_albedo().isel({axis: [1]})
+        _, sources, _ = albedo_of_file(make_model(), BANDS, one, np.full((3, 2), True))
+        assert sources == ["nearest cell of the albedo file's 2007-10-24"]
 
 
 def test_the_order_of_latitudes_and_the_count_of_longitudes_do_not_matter(make_model, make_albedo):
@@ -37,8 +93,28 @@ def test_the_nearest_date_is_taken(make_model, make_albedo):
     assert (values < 0.5).all()
 
 
+@pytest.mark.parametrize("hour", ["00:00", "11:59", "12:01", "18:00", "23:59"])
+def test_the_days_own_value_comes_first(make_model, make_albedo, hour):
+    albedo = make_albedo(dates=("2007-10-22", "2007-10-24", "2007-10-23"))
+    albedo["surface_albedo"][:, 2] = 0.9
+    model = make_model().assign_coords(time=np.datetime64(f"2007-10-23T{hour}", "ns"))
+    values, source = surface_albedo(model, BANDS, albedo, None)
+    assert (values == 0.9).all()
+    assert source["surface_albedo_source"].endswith("2007-10-23")
+
+
+@pytest.mark.parametrize(("hour", "expected"), [("06:00", "2007-10-22"), ("18:00", "2007-10-24")])
+def test_of_two_days_equally_far_the_nearer_in_hours_is_taken(
+    make_model, make_albedo, hour, expected
+):
+    model = make_model().assign_coords(time=np.datetime64(f"2007-10-23T{hour}", "ns"))
+    albedo = make_albedo(dates=("2007-10-24", "2007-10-22"))
+    _, source = surface_albedo(model, BANDS, albedo, None)
+    assert source["surface_albedo_source"].endswith(expected)
+
+
 def test_a_date_far_away_is_warned_of(make_model, make_albedo):
-    with pytest.warns(UserWarning, match="2007-10-01, is 23 days away from the scene"):
+    with pytest.warns(UserWarning, match="2007-10-01, is 22 days away from the scene"):
         surface_albedo(make_model(), BANDS, make_albedo(dates=("2007-10-01",)), None)
 
 
