@@ -7,9 +7,10 @@ import xarray as xr
 from .errors import InputError
 from .netcdf import FilePath
 
-# What has no unit, or is only counted, in the words of models and their tools.
+# What has no unit, is only counted, or says of what, in the words of models and their tools.
 _NUMBERS = {"count", "number", "particles", "fraction", "flag", "category", "none", "unitless"}
-_NUMBERS |= {"dimensionless", "nondimensional", "north", "south", "east", "west"}
+_NUMBERS |= {"dimensionless", "nondimensional", "dry", "air"}
+_NUMBERS |= {"north", "south", "east", "west", "n", "e"}
 # Other spellings of units; all that begins with these is degrees of an angle.
 _SPELLINGS = {"pascal": "pa", "pascals": "pa", "kelvin": "k", "degk": "k", "kilogram": "kg"}
 _SPELLINGS |= {"meter": "m", "meters": "m", "metre": "m", "metres": "m"}

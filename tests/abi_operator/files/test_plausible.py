@@ -181,10 +181,23 @@ def test_other_units_than_expected_are_refused(write_wrf_twin, name, units):
 @pytest.mark.parametrize(
     ("name", "spellings"),
     [
-        ("QVAPOR", ("kg kg-1", "kg/kg", "kg kg**-1", "kg kg^-1", "kg kg^{-1}", "1", "", " ")),
+        (
+            "QVAPOR",
+            (
+                "kg kg-1",
+                "kg/kg",
+                "kg kg**-1",
+                "kg kg^-1",
+                "kg kg^{-1}",
+                "kg/kg dry air",
+                "1",
+                "",
+                " ",
+            ),
+        ),
         ("QNICE", ("  kg-1", "  kg(-1)", "# kg(-1)", "#/kg", "1/kg", "kg-1", "number kg-1")),
         ("PH", ("m2 s-2", "m2/s2", "m**2 s**-2", "m^2 s^-2")),
-        ("XLAT", ("degree_north", "degrees_north", "degrees", "deg", "degrees north")),
+        ("XLAT", ("degree_north", "degrees_north", "degrees", "deg", "degrees north", "degrees_N")),
         ("P", ("Pa", "pascal")),
         ("T", ("K", "Kelvin")),
         ("EMISS", ("", "-", "1", "fraction", "dimensionless")),
