@@ -30,9 +30,9 @@ def quality_flags(state: State, bands: Sequence[str] = GRASSO2013) -> UInt8[Arra
     reflectance factor 0, radiance of emission alone) or beyond 80 degrees from the zenith
     (``grazing_sun``), the same of the satellite (``out_of_sight``: all NaN; ``grazing_view``),
     hydrometeors of which more than `LARGEST_SHARE_OUTSIDE` of the optical depth is at sizes beyond
-    what their optics were fitted to (``outside_fit``, in any of `bands`), and anisotropic grounds that reflect less than nothing or more than all
-    (``ground_below_zero``, ``ground_above_one``, in any of `bands`, under the column's sun, which
-    must be up).
+    what their optics were fitted to (``outside_fit``, in any of `bands`), and anisotropic grounds
+    that reflect less than nothing or more than all (``ground_below_zero``, ``ground_above_one``, in
+    any of `bands`, under the column's sun, which must be up).
 
     Parameters
     ----------

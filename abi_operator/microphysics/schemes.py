@@ -133,10 +133,10 @@ def _droplets(nu: float, number: float) -> SizeDistribution:
     return _by_slope(sphere(1000.0), nu, FixedNumber(number), smallest, largest)
 
 
-# Numbers of droplets: WSM uses 3e8 m-3 where it needs one (xncr of autoconversion and nc0 of effective
-# radii in WRF's source), Thompson 1e8 (Nt_c in the sources of WRF and MPAS; Thompson et al., 2008),
-# Morrison 2.5e8 (NDCNST with INUM = 1 in the sources of WRF and ERF). Limits of slope that a scheme
-# lacks are so wide here (1 cm) that they do not bite.
+# Numbers of droplets: WSM uses 3e8 m-3 where it needs one (xncr of autoconversion and nc0 of
+# effective radii in WRF's source), Thompson 1e8 (Nt_c in the sources of WRF and MPAS; Thompson et
+# al., 2008), Morrison 2.5e8 (NDCNST with INUM = 1 in the sources of WRF and ERF). Limits of slope
+# that a scheme lacks are so wide here (1 cm) that they do not bite.
 _WSM_RAIN = _by_slope(sphere(1000.0), 0.0, Intercept(8e6), 1 / 8e4, 1e-2)
 _WSM_SNOW = _by_slope(sphere(100.0), 0.0, SnowIntercept(), 1 / 1e5, 1e-2)
 # D = 11.9 m^(1/2), from 12.9 um on; the 500 um of the scheme limit fall speed and not mass.

@@ -1,9 +1,9 @@
 """Mass and number of every class of condensate in the layers of a model.
 
 The number of particles is found layer by layer, from the first of these that is there: the model's
-own effective radius, the model's own number, an assumption. What is assumed is what the microphysics
-scheme of the model implies (`abi_operator.microphysics`); of droplets it can be chosen, and is a
-general number where the scheme has none (`assumed_droplets`).
+own effective radius, the model's own number, an assumption. What is assumed is what the
+microphysics scheme of the model implies (`abi_operator.microphysics`); of droplets it can be
+chosen, and is a general number where the scheme has none (`assumed_droplets`).
 """
 
 from typing import NamedTuple

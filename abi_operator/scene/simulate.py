@@ -62,8 +62,9 @@ def simulate(
         The scenario with the variables of `nomenclature.RESULT` and optical depths of its plumes
         and hydrometeors; with C07 brightness temperature; and the share of hydrometeors' optical
         depth at sizes for which optics were not fitted, by which pixels are flagged
-        ``outside_fit``. C07 has no reflectance factor and no brf, which are NaN. By night the reflectance factor is 0 and brf NaN; without
-        albedo, and out of the satellite's sight, all is NaN.
+        ``outside_fit``. C07 has no reflectance factor and no brf, which are NaN. By night the
+        reflectance factor is 0 and brf NaN; without albedo, and out of the satellite's sight, all
+        is NaN.
 
     Raises
     ------
