@@ -56,6 +56,8 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 
 # Pressure at the ground where there is air: far from what the same air has in hPa. [Pa]
 _GROUND_PRESSURE = 2e3, 1.2e5
+# Pressure at the ground up to which a column is meant to have next to no air. [Pa]
+_NEXT_TO_NONE = 50.0
 # Height by which pressure falls to 1 / e, between the uppermost level with pressure and the ground;
 # that of air is 6 to 9 km. [m]
 _SCALE_HEIGHT = 5e2, 1e5
@@ -113,8 +115,8 @@ def _check_units(pressure: np.ndarray, height: np.ndarray, num_axes: int) -> Non
     """Refuse levels whose pressure or height is in another unit than Pa and m."""
     ground = pressure[..., -1]
     low, high = _GROUND_PRESSURE
-    bad = (ground > 0) & ~((ground >= low) & (ground <= high))
-    allowed = f"{low:g} to {high:g} Pa, or 0 without air (pressure is in Pa)"
+    bad = (ground > _NEXT_TO_NONE) & ~((ground >= low) & (ground <= high))
+    allowed = f"{low:g} to {high:g} Pa, or {_NEXT_TO_NONE:g} at most (pressure is in Pa)"
     _refuse(bad, ground, "state.atmosphere.pressure at the ground", allowed, num_axes)
     first = np.argmax(pressure > 0, axis=-1, keepdims=True)
     top, top_height = (np.take_along_axis(x, first, axis=-1)[..., 0] for x in (pressure, height))
@@ -192,7 +194,10 @@ _IN_LAYERS = ("mass_path", "number_path", "vapour", "ozone")
 
 def _num_levels(state: State, num_axes: int) -> int:
     """Number of levels, two or more, or `ValueError`."""
-    shape = np.shape(state.atmosphere.pressure)
+    pressure = state.atmosphere.pressure
+    if isinstance(pressure, list | tuple):
+        raise _list_error(".atmosphere.pressure")
+    shape = np.shape(pressure)
     if len(shape) != num_axes + 1 or shape[-1] < 2:
         raise ValueError(
             f"state.atmosphere.pressure has shape {shape}; it needs the {num_axes} axes of the "
@@ -227,10 +232,11 @@ def _refuse_list(path: Any) -> None:
     inside = path[2:3] if path[0].name == "albedo" else path
     for k, key in enumerate(path):
         if isinstance(key, jax.tree_util.SequenceKey) and key in inside:
-            label = jax.tree_util.keystr(path[:k])
-            raise ValueError(
-                f"state{label} is a list or a tuple; it must be one array: jnp.asarray(...)."
-            )
+            raise _list_error(jax.tree_util.keystr(path[:k]))
+
+
+def _list_error(label: str) -> ValueError:
+    return ValueError(f"state{label} is a list or a tuple; it must be one array: jnp.asarray(...).")
 
 
 def _field(path: Any) -> str:

@@ -49,9 +49,7 @@ def toa_albedo(
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return solve(
-        plane_albedo, column, options, True, by_view=False, check_values=check_values
-    )
+    return solve(plane_albedo, column, options, True, by_view=False, check_values=check_values)
 
 
 class SurfaceCoupling(eqx.Module):

@@ -45,9 +45,9 @@ def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
 
     tau, phase_function, solar_irradiance, planck_levels, surface_emission and isotropic_top must be
     0 or more, secant above 0, ssa and a Lambertian albedo in [0, 1], moments in [-1, 1], mu0 and mu
-    in (0, 1], relative_azimuth in [-2 pi, 2 pi]; all must be finite. Exceptions: chi_0, which the solver does not read, need only be
-    finite, and so need mu0 where solar_irradiance is 0. Each number is judged in its own precision:
-    one step above 1 is outside [0, 1].
+    in (0, 1], relative_azimuth in [-2 pi, 2 pi]; all must be finite. Exceptions: chi_0, which the
+    solver does not read, need only be finite, and so need mu0 where solar_irradiance is 0. Each
+    number is judged in its own precision: one step above 1 is outside [0, 1].
 
     Parameters
     ----------

@@ -47,8 +47,8 @@ class MixedGas(NamedTuple):
     .. math:: \frac{X}{X_0} \left(\frac{p_{k+1}}{p_0}\right)^{1 + n}
        - \frac{X}{X_0} \left(\frac{p_k}{p_0}\right)^{1 + n}, \qquad p_0 = 1013.25\ \mathrm{hPa}
 
-    where :math:`p_k` of the first level counts as 0 (`Atmosphere.counted_pressure`): the gas above it
-    is in the uppermost layer.
+    where :math:`p_k` of the first level counts as 0 (`Atmosphere.counted_pressure`): the gas above
+    it is in the uppermost layer.
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ def test_depth_is_proportional_to_the_mass_of_air(make_atmosphere, band):
 
 
 def test_air_above_the_first_level_counts(make_atmosphere):
-    """In the uppermost layer, wherever the levels begin; that level's own pressure moves nothing."""
+    """In the uppermost layer, wherever levels begin; that level's own pressure moves nothing."""
     whole = make_atmosphere()
     assert whole.pressure[0] > 1000  # there is air above
     cut = dataclasses.replace(
