@@ -31,7 +31,7 @@ from .guard.commands import jacobian
 from .microphysics import SCHEMES
 from .optics import ALL_GASES
 from .satellites import SATELLITES
-from .scene import CLASSES
+from .scene import CLASSES, DropletNumber
 from .simulation import Report, Request, Species, open_scene, simulate_scene
 from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_compiler_flags
 from .surface import EMISSIVITY_3900NM
@@ -115,6 +115,14 @@ def simulate(
             f"{', '.join(SCHEMES)}."
         ),
     ] = None,
+    droplet_number: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N | WATER,LAND",
+            help="Cloud droplets per cm3 where the model has no number of them; if not given, what "
+            "its microphysics assumes, or else 100,300.",
+        ),
+    ] = None,
     satellite: Annotated[str, typer.Option(help=f"One of {', '.join(SATELLITES)}.")] = "GOES-16",
     satellite_longitude: Annotated[
         float | None,
@@ -129,6 +137,8 @@ def simulate(
         names = check_bands(_names(bands, _IMAGER_BANDS))
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+    with one_sentence():
+        droplets = None if droplet_number is None else DropletNumber.from_text(droplet_number)
     request = Request(
         wrf,
         time=time,
@@ -143,6 +153,7 @@ def simulate(
         gases=_names(gases, ALL_GASES),
         hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
         microphysics=microphysics,
+        droplet_number=droplets,
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=num_streams,

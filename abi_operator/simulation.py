@@ -30,6 +30,7 @@ from .products import natural_color
 from .radiance import THERMAL
 from .scene import (
     CLASSES,
+    DropletNumber,
     Emissivity,
     PlumeSpecification,
     check_absorption,
@@ -88,7 +89,7 @@ class Request(NamedTuple):
         Bands to simulate, and whether broadband albedo may stand in for a missing one.
     emissivity
         Of the ground in C07, as `scene.scenario` takes it.
-    gases, hydrometeors, microphysics
+    gases, hydrometeors, microphysics, droplet_number
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
     satellite, satellite_longitude
         Name; degrees, east positive, where it does not stand at its usual place.
@@ -110,6 +111,7 @@ class Request(NamedTuple):
     gases: tuple[str, ...] = ALL_GASES
     hydrometeors: tuple[str, ...] | None = None
     microphysics: str | None = None
+    droplet_number: DropletNumber | None = None
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
     time: int | None = None
@@ -181,6 +183,8 @@ def open_scene(request: Request) -> Scene:
         check_ground(place, request.bands, albedo, request.ocean_albedo, request.emissivity)
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
             model = read_wrf(request.wrf, time, rows)
+            if request.droplet_number is not None:
+                request.droplet_number.over(model)
             tops.append(highest_top(model))
             present.update(classes_present(model, request.microphysics))
     return Scene(
@@ -221,6 +225,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         gases=request.gases,
         hydrometeors=scene.hydrometeors,
         microphysics=request.microphysics,
+        droplet_number=request.droplet_number,
         standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )
@@ -290,7 +295,8 @@ def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
     pressure = lowest if lowest == highest else f"{lowest} to {highest}"
     yield f"air above {pressure} hPa: {account['air_above_model']}"
     if account["assumed_droplet_number_count"]:
-        yield f"droplet number, assumed: {account['assumed_droplet_number']}"
+        number = account["assumed_droplet_number"], account["assumed_droplet_number_source"]
+        yield "droplet number, assumed: {} ({})".format(*number)
     if "standard_atmosphere" in account:
         yield f"ozone, and vapour and temperature above: {account['standard_atmosphere']}"
     yield f"gases that absorb: {account['gases']}"

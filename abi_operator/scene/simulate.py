@@ -17,6 +17,7 @@ from ..files.netcdf import cf_attributes
 from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import aerosol, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
 from ..planck import brightness_temperature
+from ..quality import flags_from
 from ..radiance import THERMAL, radiance
 from ..reflectance import brf
 from ..satellites import solar_irradiance
@@ -59,10 +60,11 @@ def simulate(
     -------
     xarray.Dataset
         The scenario with the variables of `nomenclature.RESULT` and optical depths of its plumes
-        and hydrometeors; with C07 brightness temperature; with hydrometeors the share of optical
-        depth that is beyond the range of sizes for which optics were fitted. C07 has no reflectance
-        factor and no brf, which are NaN. By night the reflectance factor is 0 and brf NaN; without
-        albedo, and out of the satellite's sight, all is NaN.
+        and hydrometeors; with C07 brightness temperature; and the share of hydrometeors' optical
+        depth at sizes for which optics were not fitted, by which pixels are flagged
+        ``outside_fit``. C07 has no reflectance factor and no brf, which are NaN. By night the
+        reflectance factor is 0 and brf NaN; without albedo, and out of the satellite's sight, all
+        is NaN.
 
     Raises
     ------
@@ -78,6 +80,7 @@ def simulate(
     states = column_states(scenario, bands)
     fields = _optical_depths(states.atmosphere, bands)
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
+    flags = flags | _flags(states, fields["outside_fitted_range"])
     options = {"gases": gases, "num_streams": num_streams}
     fields |= _reflectances(states, flags, bands, options)
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
@@ -98,7 +101,15 @@ def simulate(
         by_column = np.moveaxis(values, 0, -1)
         array = by_column.reshape(*by_column.shape[:-1], *shape.values())
         result[name] = ((*own_dims, *shape), array, cf_attributes(name))
+    known = result["quality_flag"]
+    result["quality_flag"] = known.dims, flags.reshape(known.shape), known.attrs
     return result.assign_attrs(num_streams=num_streams, gases=gases_attribute(gases))
+
+
+def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:
+    """Bits of ``quality_flag`` (column) of the states themselves, as `quality_flags` has them."""
+    sun, view = states.geometry.solar_zenith, states.geometry.view_zenith
+    return flags_from(np.asarray(sun), np.asarray(view), share_outside)
 
 
 def _reflectances(
@@ -162,9 +173,8 @@ def _depths_of_chunk(leaves: list[jax.Array], structure: Any, bands: tuple[str, 
             )
             for name, producer in producers.items()
         }
-        if column.hydrometeors:
-            outside = [outside_fitted_range(column, BANDS[b]) for b in bands]
-            by_band["outside_fitted_range"] = jnp.stack(outside)
+        outside = [outside_fitted_range(column, BANDS[b]) for b in bands]
+        by_band["outside_fitted_range"] = jnp.stack(outside)
         return by_band | {f"{name}_aod_550": p.aod_550 for name, p in column.plumes.items()}
 
     return jax.vmap(depths)(jax.tree.unflatten(structure, leaves))

@@ -1,8 +1,9 @@
 """Checks of the values of the solver's arguments, outside any compilation.
 
-They read every number on the host, so they are asked for, not always made: without
-``check_values=True`` nothing here is called. The first argument that offends is reported, in the
-order of the call.
+`check_in_memory` is made of every call whose arguments lie in memory, so it must take next to no
+time: it reads each array once, as integers, and looks closer only where that leaves a doubt.
+`check_arguments` is what looks closer. The first argument that offends is reported, in the order of
+the call.
 """
 
 from typing import Any
@@ -15,6 +16,8 @@ _FINITE = (-np.inf, np.inf, "()")
 _NOT_NEGATIVE = (0.0, np.inf, "[)")
 _UNIT_INTERVAL = (0.0, 1.0, "[]")
 _COSINE = (0.0, 1.0, "(]")
+# Radians: a difference of two azimuths is 2 pi at most, and what is more is degrees.
+_AZIMUTH = (-6.2832, 6.2832, "[]")
 
 # Lowest and highest value, and which of the two belong to the range.
 RANGES = {
@@ -24,7 +27,7 @@ RANGES = {
     "albedo": _UNIT_INTERVAL,
     "mu0": _COSINE,
     "mu": _COSINE,
-    "relative_azimuth": _FINITE,
+    "relative_azimuth": _AZIMUTH,
     "phase_function": _NOT_NEGATIVE,
     "secant": (0.0, np.inf, "()"),
     "solar_irradiance": _NOT_NEGATIVE,
@@ -42,9 +45,9 @@ def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
 
     tau, phase_function, solar_irradiance, planck_levels, surface_emission and isotropic_top must be
     0 or more, secant above 0, ssa and a Lambertian albedo in [0, 1], moments in [-1, 1], mu0 and mu
-    in (0, 1]; all must be finite. Exceptions: chi_0, which the solver does not read, need only be
-    finite, and so need mu0 where solar_irradiance is 0. Each number is judged in its own precision:
-    one step above 1 is outside [0, 1].
+    in (0, 1], relative_azimuth in [-2 pi, 2 pi]; all must be finite. Exceptions: chi_0, which the
+    solver does not read, need only be finite, and so need mu0 where solar_irradiance is 0. Each
+    number is judged in its own precision: one step above 1 is outside [0, 1].
 
     Parameters
     ----------
@@ -92,6 +95,50 @@ def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
         _check_series(*(np.asarray(arguments[name]) for name in ("tau", "ssa", "moments")))
 
 
+def check_in_memory(arguments: dict[str, Any]) -> None:
+    """`check_arguments` of arrays that can be read at once; others are let pass.
+
+    Those are traced ones and those on another device than the CPU. Series are not judged.
+    """
+    leaves = [x for value in arguments.values() for x in jax.tree.leaves(value)]
+    if not all(isinstance(x, np.ndarray) or _is_on_host(x) for x in leaves):
+        return
+    for name, value in arguments.items():
+        if value is not None and not _surely_inside(name, value):
+            check_arguments(arguments, series_summed=False)
+            return
+
+
+def _is_on_host(x: Any) -> bool:
+    if not isinstance(x, jax.Array) or isinstance(x, Tracer):
+        return False
+    return all(device.platform == "cpu" for device in x.devices())
+
+
+def _surely_inside(name: str, value: Any) -> bool:
+    """Whether all numbers are in the range of an argument; False where it takes a closer look."""
+    if not isinstance(value, np.ndarray | jax.Array):
+        return False
+    x = np.asarray(value)
+    low, high, ends = RANGES[name]
+    if x.size == 0 or x.dtype not in _BITS:
+        return x.size == 0
+    if low == 0 and ends[0] == "[" or name == "moments":
+        # Floating numbers from 0 on are ordered as their bits are, read as integers; negative ones
+        # and NaN come after all others. So one number tells, and is found in one pass.
+        bits = _BITS[x.dtype]
+        limit = np.asarray(high, x.dtype).view(bits)
+        if x.flags.c_contiguous or x.ndim < 2:
+            largest = np.max(x.view(bits))
+            return bool(largest <= limit if ends[1] == "]" else largest < limit)
+    smallest, largest = np.min(x), np.max(x)
+    above = smallest >= low if ends[0] == "[" else smallest > low
+    return bool(above and (largest <= high if ends[1] == "]" else largest < high))
+
+
+_BITS = {np.dtype(np.float32): np.uint32, np.dtype(np.float64): np.uint64}
+
+
 def _is_surface(albedo: Any) -> bool:
     # A list of numbers is an array to the solver, although a pytree of many leaves to JAX.
     if isinstance(albedo, list | tuple):
@@ -121,7 +168,9 @@ def _check_range(
     if np.any(bad):
         index, others = _first(bad)
         interval = f"{ends[0]}{low:g}, {high:g}{ends[1]}"
-        raise ValueError(f"{name}{_subscript(index)} = {x[index]!s} is outside {interval}{others}.")
+        unit = " rad" if name == "relative_azimuth" else ""
+        label = f"{name}{_subscript(index)} = {x[index]!s}"
+        raise ValueError(f"{label} is outside {interval}{unit}{others}.")
 
 
 def _check_series(tau: np.ndarray, ssa: np.ndarray, moments: np.ndarray) -> None:

@@ -57,7 +57,7 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
     picture = "natural_color_2007-10-23T180000.png"
     assert sorted(path.name for path in out.iterdir()) == ["inputs", picture, "result.nc"]
     assert f"wrote {out / 'result.nc'}" in outcome.output
-    assert "64 pixels; flagged: none" in outcome.output
+    assert "64 pixels; flagged: outside_fit 1" in outcome.output
     assert f"computed on {usable_cores()} core" in outcome.output
     with read_result(out / "result.nc") as result:
         assert result.sizes["time"] == 1 and result.sizes["band"] == 4
@@ -67,6 +67,25 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
         assert "US Standard Atmosphere 1976" in result.attrs["air_above_model"]
     with Image.open(out / picture) as image:
         assert image.size == (512, 512)
+
+
+def test_droplet_numbers_can_be_chosen(invoke, tmp_path, inputs):
+    options = ["--ocean-albedo", 0.03, "--bands", "C01", "--num-streams", 2]
+    options += ["--albedo", inputs.albedo, "--droplet-number"]
+    depths = []
+    for number in ("250", "250,500"):
+        out = tmp_path / number
+        outcome = invoke("simulate", inputs.wrf, *options, number, "--out", out)
+        assert outcome.exit_code == 0, outcome.output
+        with read_result(out / "result.nc") as result:
+            depths.append(result["liquid_optical_depth"].values)
+    said = "250 cm-3 over water, 500 cm-3 over land (as asked for)"
+    assert f"droplet number, assumed: {said}" in outcome.output
+    thick = depths[0] > 1
+    ratio = depths[1][thick] / depths[0][thick]
+    assert np.all((abs(ratio - 1) < 0.01) | (abs(ratio - 2 ** (1 / 3)) < 0.03))
+    outcome = invoke("simulate", inputs.wrf, *options, "1e8", "--out", tmp_path / "no")
+    assert outcome.exit_code == 2 and "at most 10000 cm-3" in outcome.stderr
 
 
 def test_a_result_is_all_that_the_operator_needs(invoke, tmp_path):

@@ -5,6 +5,7 @@ import numpy as np
 from abi_operator.scene import add_accounts, negative_lines
 from abi_operator.scene.account import condensate_account, negative_account
 from abi_operator.scene.condensate import Condensate
+from abi_operator.scene.droplet_number import assumed_droplets
 from abi_operator.scene.hydrometeors import Hydrometeors, Paths
 
 
@@ -23,10 +24,13 @@ def test_blocks_add_up():
     }
 
 
+WSM6 = assumed_droplets(None, "wsm6")
+
+
 def account(total, left_out, num_assumed=0):
     nothing = np.zeros(1)
     paths = {name: Paths(nothing, nothing, num_assumed) for name in ("cloud", "snow")}
-    return condensate_account(Hydrometeors(paths, Condensate(total, left_out), "wsm6"))
+    return condensate_account(Hydrometeors(paths, Condensate(total, left_out), "wsm6", WSM6))
 
 
 def test_shares_and_assumptions_are_those_of_all_blocks():

@@ -39,6 +39,8 @@ def test_a_scenario_has_the_variables_of_the_nomenclature(make_scenario):
     np.testing.assert_allclose(made["smoke_brightness"], BRIGHTNESS)
     assert made.attrs["num_levels_above_model"] == 8
     assert made.attrs["assumed_droplet_number_count"] == 3
+    assert made.attrs["assumed_droplet_number"] == "250 cm-3"
+    assert made.attrs["assumed_droplet_number_source"] == "as the microphysics morrison does"
     assert made.attrs["model_title"] == "test"
 
 
