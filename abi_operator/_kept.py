@@ -30,6 +30,7 @@ import numpy as np
 from jax.experimental import serialize_executable
 from jax.tree_util import PyTreeDef
 
+from ._ending import unfinished
 from ._processor import processor_key
 
 # What may take part in a trace. What is pickled by its name alone must come from one of these.
@@ -152,9 +153,10 @@ def _write(path: Path, content: bytes) -> None:
     """All of it or nothing: others read at any time."""
     part = path.with_suffix(f".{os.getpid()}")
     try:
-        part.write_bytes(content)
-        part.chmod(0o600)
-        part.replace(path)
+        with unfinished(part):
+            part.write_bytes(content)
+            part.chmod(0o600)
+            part.replace(path)
     except OSError:  # a full disk: it will be compiled again
         part.unlink(missing_ok=True)
 

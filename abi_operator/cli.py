@@ -22,7 +22,7 @@ from typing import Annotated, Any
 import jax
 import typer
 
-from . import _kept
+from . import _ending, _kept
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence
 from .demo import write_demo
@@ -241,7 +241,8 @@ def _cache_folder() -> str:
 
 
 def _prepare_process(keep_programs: bool) -> None:
-    """Settle what a process of our own computes with, before JAX starts."""
+    """Settle how a process of our own ends and what it computes with, before JAX starts."""
+    _ending.end_at_signals()
     # Tracing makes many small objects that stay; a tenth of it is a search for some that do not.
     gc.freeze()
     gc.set_threshold(50_000)

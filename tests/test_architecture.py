@@ -26,6 +26,7 @@ FLOORS = [
     {"_compiler", "_kept"},
     {
         "_batching",
+        "_ending",
         "_kernels",
         "_processor",
         "_slopes",
