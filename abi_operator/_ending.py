@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 from threading import Lock, Thread, current_thread, main_thread
 from typing import Any
@@ -115,7 +116,7 @@ def _is_our_command() -> bool:
     first = Path(next(iter(getattr(sys, "argv", [])), "")).name
     if first == "-m":  # Python has not yet found what it is to run
         words = sys.orig_argv
-        return f"-m{package}" in words or ["-m", package] in map(list, zip(words, words[1:]))
+        return f"-m{package}" in words or ("-m", package) in pairwise(words)
     return first in ("abi-operator", "abi-operator.exe")
 
 

@@ -107,6 +107,9 @@ def _compiled(
         structure.append(tree)
         return results
 
+    # Of no other name, so that it is compiled: a program that JAX has read from its own cache would
+    # be written without some of its kernels, and end whoever reads it ("Function ... not found").
+    flat.__name__ = f"flat_{os.urandom(8).hex()}"
     leaves, inputs = jax.tree.flatten(arguments)
     program = jax.jit(flat, compiler_options=options).lower(leaves).compile()
     (tree,) = structure
