@@ -32,7 +32,14 @@ from .microphysics import SCHEMES
 from .optics import ALL_GASES
 from .satellites import SATELLITES
 from .scene import CLASSES
-from .simulation import Report, Request, Species, open_scene, simulate_scene
+from .simulation import (
+    Report,
+    Request,
+    Species,
+    open_scene,
+    pictures_of_before,
+    simulate_scene,
+)
 from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_compiler_flags
 from .surface import EMISSIVITY_3900NM
 
@@ -58,9 +65,11 @@ def _user_warnings() -> Iterator[None]:
         typer.echo(f"warning: {message}", err=True)
 
 
-def _print(report: Report, out: Path) -> None:
+def _print(report: Report, out: Path, before: list[str]) -> None:
     for name in report.files:
         typer.echo(f"wrote {out / name}")
+    for name in sorted(set(before) - set(report.files)):
+        typer.echo(f"removed {out / name}, a picture of the result before")
     for line in report.lines:
         typer.echo(line)
     cores = usable_cores()
@@ -149,9 +158,10 @@ def simulate(
     )
     with one_sentence(), _user_warnings():
         scene = open_scene(request)
-        with output_folder(out) as folder:
+        before = pictures_of_before(out)
+        with output_folder(out, outdated=before) as folder:
             report = simulate_scene(scene, folder)
-        _print(report, out)
+        _print(report, out, before)
 
 
 def _names(text: str, everything: tuple[str, ...]) -> tuple[str, ...]:
@@ -174,14 +184,15 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for inputs and results.")] = Path("abi-demo"),
     seed: Annotated[int, typer.Option(min=0, help="Another seed is another coast.")] = 0,
 ) -> None:
-    """Make up a smoky Californian coast, simulate it, and do what other packages add."""
+    """Make up a smoky Californian coast, simulate it, retrieve the smoke and score the result."""
     with one_sentence(), _user_warnings():
-        with output_folder(out) as folder:
+        before = pictures_of_before(out)
+        with output_folder(out, outdated=before) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
             # As in the paper, which neglects absorption by gases.
             request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume, gases=())
             report = simulate_scene(open_scene(request), folder)
-        _print(report, out)
+        _print(report, out, before)
     for entry in entry_points(group=COMMANDS, name="demo"):
         finish_demo = _load(entry)
         if finish_demo is not None:

@@ -201,6 +201,18 @@ def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monk
     assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
 
 
+def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_path, inputs):
+    out = tmp_path / "out"
+    options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--gases", "none", "--out", out]
+    first = invoke("simulate", inputs.wrf, "--bands", "C07", "--emissivity", "water", *options)
+    assert first.exit_code == 0, first.output
+    (out / "C07_mine.png").touch()
+    outcome = invoke("simulate", inputs.wrf, "--bands", "C01, C06", *options)
+    picture = "C07_2007-10-23T180000.png"
+    assert f"removed {out / picture}, a picture of the result before\n" in outcome.stdout
+    assert sorted(path.name for path in out.iterdir()) == ["C07_mine.png", "result.nc"]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
