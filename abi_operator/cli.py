@@ -23,6 +23,7 @@ import jax
 import typer
 
 from . import _ending, _kept
+from ._version import __version__
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence
 from .demo import write_demo
@@ -52,6 +53,7 @@ _DEMO_OCEAN_ALBEDO = 0.03
 _ALL, _NONE = "all", "none"
 _NO_CACHE = "--no-cache"
 _NO_CACHE_HELP = "Use and keep no compiled programs; also behind a command's name."
+_VERSION = "Say which version this is."
 _IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
 
 
@@ -224,12 +226,16 @@ def make_app(prepare: Callable[[bool], None] = lambda keep_programs: None) -> ty
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},  # of all commands
     )
 
     @app.callback()
     def before_every_command(  # pyright: ignore[reportUnusedFunction]
         context: typer.Context,
         no_cache: Annotated[bool, typer.Option(_NO_CACHE, help=_NO_CACHE_HELP)] = False,
+        version: Annotated[
+            bool, typer.Option("--version", callback=_say_version, is_eager=True, help=_VERSION)
+        ] = False,
     ) -> None:
         prepare(not no_cache)
         context.with_resource(jax.enable_x64(True))
@@ -242,6 +248,12 @@ def make_app(prepare: Callable[[bool], None] = lambda keep_programs: None) -> ty
         if command is not None:
             app.command(entry.name)(command)
     return app
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"abi-operator {__version__}")
+        raise typer.Exit
 
 
 def _cache_folder() -> str:
@@ -266,10 +278,10 @@ def _prepare_process(keep_programs: bool) -> None:
         _kept.use(folder)
 
 
-def main() -> None:
-    """Run the command line, in a process of its own."""
+def main(name: str | None = None) -> None:
+    """Run the command line, in a process of its own, which help calls by its name."""
     words = sys.argv[1:]
     # An option of all commands, which may stand behind the name of one as well.
     if _NO_CACHE in words:
         words = [_NO_CACHE, *(word for word in words if word != _NO_CACHE)]
-    make_app(_prepare_process)(words)
+    make_app(_prepare_process)(words, prog_name=name)

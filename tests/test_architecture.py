@@ -8,6 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 
 FLOORS = [
+    {"__main__"},
     {"cli"},
     {"guard", "simulation"},
     {"commands", "demo", "scene"},

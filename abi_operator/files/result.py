@@ -248,7 +248,10 @@ def note_files(path: str | PathLike[str], names: Sequence[str]) -> None:
 
 
 def noted_files(path: str | PathLike[str]) -> list[str]:
-    """Which files beside a result file were made of it and are still there; none if it is no result."""
+    """Names of files beside a result file that were made of it and are still there.
+
+    None of what is no result.
+    """
     folder = Path(path).absolute().parent
     try:
         with open_netcdf(path) as result:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from abi_operator import _ending
 from abi_operator.files import output_folder
 
 ROOT = Path(__file__).parents[2]
@@ -106,6 +107,23 @@ def test_it_ends_with_one_line_while_jax_is_imported(tmp_path):
     (tmp_path / "jax.py").write_text(f"import hashlib\nprint('begun', flush=True)\n{BUSY}\n")
     with begun(COMMAND, tmp_path, [tmp_path]) as process:
         assert ended(process, signal.SIGINT) == (130, "abi-operator: interrupted.\n")
+
+
+@pytest.mark.parametrize(
+    ("argv", "original", "ours"),
+    [
+        (["/usr/bin/abi-operator", "demo"], ["python", "/usr/bin/abi-operator", "demo"], True),
+        (["-m", "demo"], ["python", "-X", "dev", "-m", "abi_operator", "demo"], True),
+        (["-m"], ["python", "-mabi_operator"], True),
+        (["-m", "abi_operator"], ["python", "-m", "pdb", "abi_operator"], False),
+        (["mine.py", "abi-operator"], ["python", "mine.py", "abi-operator"], False),
+        ([""], ["python"], False),
+    ],
+)
+def test_our_command_is_known_by_its_name(monkeypatch, argv, original, ours):
+    monkeypatch.setattr(sys, "argv", argv)
+    monkeypatch.setattr(sys, "orig_argv", original)
+    assert _ending._is_our_command() == ours
 
 
 def test_signals_are_the_business_of_whoever_imports_us(tmp_path):
