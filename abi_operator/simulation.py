@@ -17,6 +17,8 @@ import xarray as xr
 from .bands import GRASSO2013
 from .files import (
     ResultWriter,
+    note_files,
+    noted_files,
     read_mcd43a1,
     read_plume,
     read_result,
@@ -252,7 +254,14 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:
         pictures = _draw(result, folder)
-        return Report([RESULT, *pictures], [*_flag_lines(result), *_account_lines(account)])
+        report = Report([RESULT, *pictures], [*_flag_lines(result), *_account_lines(account)])
+    note_files(folder / RESULT, pictures)
+    return report
+
+
+def pictures_of_before(folder: Path) -> list[str]:
+    """Names of the pictures of the result that is in a folder, which another will replace."""
+    return noted_files(folder / RESULT)
 
 
 def _draw(result: xr.Dataset, folder: Path) -> list[str]:

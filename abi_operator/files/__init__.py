@@ -13,6 +13,8 @@ from .mcd43 import read_mcd43a1 as read_mcd43a1
 from .mcd43 import read_white_sky as read_white_sky
 from .plume import read_plume as read_plume
 from .result import ResultWriter as ResultWriter
+from .result import note_files as note_files
+from .result import noted_files as noted_files
 from .result import read_result as read_result
 from .wrf import read_wrf as read_wrf
 from .wrf import wrf_coordinates as wrf_coordinates

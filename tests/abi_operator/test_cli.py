@@ -1,6 +1,7 @@
 """The command line, on the demonstration's files and on broken ones."""
 
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from abi_operator import cli, scene, simulation
+from abi_operator import __version__, cli, scene, simulation
 from abi_operator.demo import write_demo
 from abi_operator.files import InputError, read_result
 from abi_operator.nomenclature import QUALITY_FLAGS
@@ -235,6 +236,18 @@ def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monk
     assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
 
 
+def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_path, inputs):
+    out = tmp_path / "out"
+    options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--gases", "none", "--out", out]
+    first = invoke("simulate", inputs.wrf, "--bands", "C07", "--emissivity", "water", *options)
+    assert first.exit_code == 0, first.output
+    (out / "C07_mine.png").touch()
+    outcome = invoke("simulate", inputs.wrf, "--bands", "C01, C06", *options)
+    picture = "C07_2007-10-23T180000.png"
+    assert f"removed {out / picture}, a picture of the result before\n" in outcome.stdout
+    assert sorted(path.name for path in out.iterdir()) == ["C07_mine.png", "result.nc"]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -292,6 +305,19 @@ def test_every_command_may_keep_what_it_compiles(monkeypatch, capsys):
     text = capsys.readouterr().out
     assert text.startswith(3 * "float64\n")
     assert str(default_cache_folder()) in text and "--no-cache" in text
+
+
+def test_it_says_its_version_and_helps(invoke, monkeypatch, capsys):
+    assert invoke("--version").stdout == f"abi-operator {__version__}\n"
+    for words in (["-h"], ["simulate", "-h"], ["jacobian", "check", "-h"]):
+        outcome = invoke(*words)
+        assert outcome.exit_code == 0 and outcome.stdout.startswith("Usage: "), outcome.output
+    assert "what other packages add" not in invoke("demo", "-h").stdout
+    monkeypatch.setattr(cli, "_prepare_process", lambda keep_programs: None)
+    monkeypatch.setattr(sys, "argv", ["__main__.py", "simulate", "-h"])
+    with pytest.raises(SystemExit):
+        runpy.run_module("abi_operator", run_name="__main__")
+    assert capsys.readouterr().out.startswith("Usage: python -m abi_operator simulate ")
 
 
 PROCESS = """
