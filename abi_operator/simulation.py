@@ -40,6 +40,7 @@ from .scene import (
     check_gases,
     check_ground,
     check_microphysics,
+    check_sight,
     classes_present,
     completion_heights,
     highest_top,
@@ -182,6 +183,7 @@ def open_scene(request: Request) -> Scene:
     tops, present = [], set()
     for time in times:
         place = wrf_coordinates(request.wrf, time)
+        check_sight(place, request.satellite, request.satellite_longitude)
         check_ground(place, request.bands, albedo, request.ocean_albedo, request.emissivity)
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
             model = read_wrf(request.wrf, time, rows)

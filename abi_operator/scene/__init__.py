@@ -26,6 +26,7 @@ from .run import row_blocks as row_blocks
 from .run import run as run
 from .scenario import check_absorption as check_absorption
 from .scenario import scenario as scenario
+from .sight import check_sight as check_sight
 from .simulate import simulate as simulate
 from .species import PlumeSpecification as PlumeSpecification
 from .species import classes_of as classes_of

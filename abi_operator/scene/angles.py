@@ -25,6 +25,8 @@ SATELLITE_LONGITUDE: dict[str, float] = {
 }
 """Longitude above which each satellite stands or stood in service. [degree] (NOAA OSPO)"""
 
+_ANY_TIME = np.datetime64("2000-01-01T12:00", "ns")
+
 
 class Angles(NamedTuple):
     """Directions of the sun and the satellite (y, x). [degree]
@@ -63,6 +65,19 @@ def find_angles(
     view_zenith, satellite_azimuth = _look(time, latitude, longitude, satellite_longitude)
     apart = np.abs(np.degrees(azimuth) - satellite_azimuth) % 360
     return Angles(90 - np.degrees(altitude), view_zenith, np.minimum(apart, 360 - apart))
+
+
+def view_zenith(
+    latitude: np.ndarray, longitude: np.ndarray, satellite_longitude: float
+) -> np.ndarray:
+    """Zenith angle under which the satellite is seen, which is the same at all times. [degree]
+
+    Parameters
+    ----------
+    latitude, longitude, satellite_longitude
+        As of `find_angles`. [degree]
+    """
+    return _look(_ANY_TIME, latitude, longitude, satellite_longitude)[0]
 
 
 def _look(

@@ -261,6 +261,7 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--bands", "C04", "--satellite", "GOES-19"], "is not known of GOES-19"),
         (["--ocean-albedo", "0.1", "--time", "1"], "has 1 times; ask for one of them"),
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
+        (["--satellite-longitude", "90"], "; give --satellite GOES-16 or GOES-17 or GOES-18"),
         (["--plume-species", "dust"], "'dust' is not one of"),
     ],
 )
