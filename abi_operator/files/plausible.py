@@ -33,6 +33,9 @@ class Range(NamedTuple):
     traces: float = 0.0
 
 
+# Of a range, what rounding in float32 may leave beyond its ends. [-]
+_ROUNDING = 1e-6
+
 # Advection that is not made to stay positive undershoots beside a steep edge (Skamarock and Weisman
 # 2009, doi:10.1175/2008MWR2583.1, on WRF's, and on the water that comes of taking it for zero). A
 # hundredth of the step is taken for that: -8e-14 kg kg-1 is usual behind a microphysics scheme that
@@ -67,6 +70,9 @@ PLAUSIBLE: dict[str, Range] = {
     "surface_temperature": Range(150.0, 1500.0),
     "surface_emissivity": Range(0, 1),
     "land_mask": Range(0, 1),
+    "sea_ice": Range(0, 1),
+    "snow_cover": Range(0, 1),
+    "snow_mass": Range(0, 1e5),  # ice sheets, where a model does not stop counting before
     # A dew point of 43 degrees C at 1000 hPa; the highest observed, in Dhahran on 8 July 2003, is
     # 35, which is 0.037 kg kg-1.
     "vapour_mixing_ratio": Range(0, 0.06, _MASS_TRACES),
@@ -135,9 +141,10 @@ def check_values(
         As in `check_written`.
     """
     lowest = allowed.lowest - allowed.traces
-    if not values.size or (values.min() >= lowest and values.max() <= allowed.highest):
+    rounding = _ROUNDING * (allowed.highest - allowed.lowest)
+    wrong = (values < lowest - rounding) | (values > allowed.highest + rounding)
+    if not wrong.any():
         return
-    wrong = (values < lowest) | (values > allowed.highest)
     value = values[tuple(np.argwhere(wrong)[0])]
     unit = "" if units == "1" else f" {units}"
     slack = f", or {lowest:g} as advection leaves it" if allowed.traces and value < 0 else ""

@@ -39,7 +39,14 @@ def spoiled(write_wrf_twin):
 
 
 def test_every_variable_of_a_model_has_a_range():
-    assert set(PLAUSIBLE) == set(MODEL)
+    derived = {name for name in MODEL if name.endswith("_bounds")}
+    assert set(MODEL) - derived <= set(PLAUSIBLE)
+
+
+def test_rounding_is_no_fault(spoiled):
+    read_wrf(spoiled("EMISS", np.nextafter(np.float32(1), np.float32(2))), 1)
+    with pytest.raises(InputError, match="EMISS in .* is 1.001"):
+        read_wrf(spoiled("EMISS", 1.001), 1)
 
 
 @pytest.mark.parametrize(
