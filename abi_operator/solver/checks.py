@@ -6,6 +6,7 @@ time: it reads each array once, as integers, and looks closer only where that le
 the call.
 """
 
+from functools import cache
 from typing import Any
 
 import jax
@@ -100,43 +101,55 @@ def check_in_memory(arguments: dict[str, Any]) -> None:
 
     Those are traced ones and those on another device than the CPU. Series are not judged.
     """
-    leaves = [x for value in arguments.values() for x in jax.tree.leaves(value)]
-    if not all(isinstance(x, np.ndarray) or _is_on_host(x) for x in leaves):
+    given = {name: x for name, x in arguments.items() if x is not None}
+    others = [x for x in given.values() if type(x) is not np.ndarray]
+    if others and not all(map(_is_on_host, jax.tree.leaves(others))):
         return
-    for name, value in arguments.items():
-        if value is not None and not _surely_inside(name, value):
-            check_arguments(arguments, series_summed=False)
-            return
+    if not all(_surely_inside(name, x) for name, x in given.items()):
+        check_arguments(arguments, series_summed=False)
 
 
 def _is_on_host(x: Any) -> bool:
-    if not isinstance(x, jax.Array) or isinstance(x, Tracer):
-        return False
-    return all(device.platform == "cpu" for device in x.devices())
+    if isinstance(x, jax.Array):
+        return not isinstance(x, Tracer) and all(d.platform == "cpu" for d in x.devices())
+    return isinstance(x, np.ndarray)
 
 
 def _surely_inside(name: str, value: Any) -> bool:
-    """Whether all numbers are in the range of an argument; False where it takes a closer look."""
+    """Whether all numbers are in the range of an argument; False where it takes a closer look.
+
+    Floating numbers from 0 on are ordered as their bits are, read as integers; negative ones and
+    NaN come after all others. So one integer tells, and is found in one pass.
+    """
     if not isinstance(value, np.ndarray | jax.Array):
         return False
     x = np.asarray(value)
+    if x.size == 0:
+        return True
+    limits = _bits(name, x.dtype)
+    if limits is not None and x.flags.c_contiguous:
+        integers, largest = limits
+        return bool(x.view(integers).max() <= largest)
     low, high, ends = RANGES[name]
-    if x.size == 0 or x.dtype not in _BITS:
-        return x.size == 0
-    if low == 0 and ends[0] == "[" or name == "moments":
-        # Floating numbers from 0 on are ordered as their bits are, read as integers; negative ones
-        # and NaN come after all others. So one number tells, and is found in one pass.
-        bits = _BITS[x.dtype]
-        limit = np.asarray(high, x.dtype).view(bits)
-        if x.flags.c_contiguous or x.ndim < 2:
-            largest = np.max(x.view(bits))
-            return bool(largest <= limit if ends[1] == "]" else largest < limit)
-    smallest, largest = np.min(x), np.max(x)
+    smallest, largest = x.min(), x.max()
     above = smallest >= low if ends[0] == "[" else smallest > low
     return bool(above and (largest <= high if ends[1] == "]" else largest < high))
 
 
-_BITS = {np.dtype(np.float32): np.uint32, np.dtype(np.float64): np.uint64}
+@cache
+def _bits(name: str, dtype: np.dtype) -> tuple[Any, np.unsignedinteger] | None:
+    """Integers of which a floating number is one, and the largest of a range from 0 on.
+
+    None for ranges that begin elsewhere. That of moments does, but most are not negative.
+    """
+    low, high, ends = RANGES[name]
+    integers = {4: np.uint32, 8: np.uint64}.get(dtype.itemsize)
+    from_zero = (low == 0 and ends[0] == "[") or name == "moments"
+    if integers is None or dtype.kind != "f" or not from_zero:
+        return None
+    end = np.asarray(high, dtype)
+    largest = end if ends[1] == "]" else np.nextafter(end, np.zeros_like(end))
+    return integers, largest.view(integers)[()]
 
 
 def _is_surface(albedo: Any) -> bool:
