@@ -34,7 +34,7 @@ from .satellites import SATELLITES
 from .scene import CLASSES
 from .simulation import Report, Request, Species, open_scene, simulate_scene
 from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_compiler_flags
-from .surface import EMISSIVITY_3900NM
+from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
 
 COMMANDS = "abi_operator.commands"
 """Group of the entry points by which other packages add commands."""
@@ -81,6 +81,20 @@ def simulate(
     ] = None,
     ocean_albedo: Annotated[
         float | None, typer.Option(min=0, max=1, help="Albedo of water, in all bands but C07.")
+    ] = None,
+    sea_ice_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of sea ice, where the model has some: a number for all bands but C07, or "
+            f"one of {', '.join(SNOW_AND_ICE_ALBEDO)}. Without it such columns are left out."
+        ),
+    ] = None,
+    snow_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of the model's snow on the ground, likewise. Without it the ground has "
+            "that of the file."
+        ),
     ] = None,
     broadband: Annotated[
         bool, typer.Option(help="Let broadband albedo stand in for missing spectral bands.")
@@ -135,6 +149,8 @@ def simulate(
         bands=names,
         albedo=albedo,
         ocean_albedo=ocean_albedo,
+        sea_ice_albedo=_number(sea_ice_albedo),
+        snow_albedo=_number(snow_albedo),
         broadband=broadband,
         emissivity=_number(emissivity),
         plume=plume,

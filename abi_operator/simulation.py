@@ -31,11 +31,13 @@ from .radiance import THERMAL
 from .scene import (
     CLASSES,
     Emissivity,
+    IceAlbedo,
     PlumeSpecification,
     check_absorption,
     check_classes,
     check_gases,
     check_ground,
+    check_ice_albedo,
     check_microphysics,
     classes_present,
     completion_heights,
@@ -54,6 +56,9 @@ _SOURCES = {
     "emissivity_source": "emissivity of the ground in C07",
     "surface_temperature_source": "temperature of the ground",
 }
+
+# The same for how many columns something covers.
+_COVERS = {"sea_ice_count": "ice on the sea", "snow_count": "snow on the ground"}
 
 # Brightness temperatures that are black and white in a picture. [K]
 _GREYS = (320.0, 220.0)
@@ -87,6 +92,8 @@ class Request(NamedTuple):
         Bands to simulate, and whether broadband albedo may stand in for a missing one.
     emissivity
         Of the ground in C07, as `scene.scenario` takes it.
+    sea_ice_albedo, snow_albedo
+        As `scene.scenario` takes them. [-]
     gases, hydrometeors, microphysics
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
     satellite, satellite_longitude
@@ -113,6 +120,8 @@ class Request(NamedTuple):
     satellite_longitude: float | None = None
     time: int | None = None
     num_streams: int = 8
+    sea_ice_albedo: IceAlbedo | None = None
+    snow_albedo: IceAlbedo | None = None
 
 
 class Scene(NamedTuple):
@@ -161,6 +170,8 @@ def open_scene(request: Request) -> Scene:
     check_absorption(request.satellite, request.bands, check_gases(request.gases))
     check_classes(request.hydrometeors or ())
     check_microphysics(request.microphysics)
+    check_ice_albedo(request.sea_ice_albedo, "sea ice")
+    check_ice_albedo(request.snow_albedo, "snow")
     coordinates = wrf_coordinates(request.wrf, request.time or 0)
     shape = coordinates.sizes["y"], coordinates.sizes["x"]
     times = tuple(range(coordinates.sizes["time"])) if request.time is None else (request.time,)
@@ -212,6 +223,8 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         scenario,
         albedo=scene.albedo,
         ocean_albedo=request.ocean_albedo,
+        sea_ice_albedo=request.sea_ice_albedo,
+        snow_albedo=request.snow_albedo,
         emissivity=request.emissivity,
         plumes=scene.plumes,
         satellite=request.satellite,
@@ -299,6 +312,9 @@ def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
     for name, words in _SOURCES.items():
         if name in account:
             yield f"{words}: {account[name]}"
+    for name, words in _COVERS.items():
+        if name in account:
+            yield f"{words}: {account[name]} columns"
     if account["unsimulated_condensate_share"]:
         share = 100 * float(account["unsimulated_condensate_share"])
         kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")

@@ -50,6 +50,9 @@ VARIABLE_MAP = {
     "EMISS": "surface_emissivity",
     "XLAND": "land_mask",  # 1 land, 2 water
     "LANDMASK": "land_mask",  # 1 land, 0 water
+    "SEAICE": "sea_ice",
+    "SNOWC": "snow_cover",
+    "SNOW": "snow_mass",  # as liquid water
 }
 """WRF's name of a variable: ours. Of two that are alternatives the latter is preferred."""
 
@@ -98,6 +101,9 @@ _TAKEN_AS_THEY_ARE = (
     "surface_pressure",
     "surface_temperature",
     "surface_emissivity",
+    "sea_ice",
+    "snow_cover",
+    "snow_mass",
 )
 
 _ADVICE = "give a WRF output file (wrfout_*) that holds them"
@@ -117,7 +123,7 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
     -------
     xarray.Dataset
         Coordinates ``time``, of the whole file, and ``latitude`` and ``longitude`` (y, x)
-        [degree]; ``land_mask`` if the file has one. Attributes ``title``,
+        [degree]; ``land_mask`` and ``sea_ice`` if the file has them. Attributes ``title``,
         ``microphysics_scheme`` (a name of `SCHEMES`, or ``"MP_PHYSICS=99"`` for a number that is
         not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
         fewer) and ``moving_nest`` (1 where positions differ from time to time, else 0).
@@ -135,7 +141,11 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
             attrs=_attributes(file) | {"moving_nest": int(_moves(file))},
         )
         land_mask = _land_mask(file, **place)
-        return dataset if land_mask is None else dataset.assign(land_mask=land_mask)
+        if land_mask is not None:
+            dataset = dataset.assign(land_mask=land_mask)
+        if "SEAICE" in file:
+            dataset = dataset.assign(sea_ice=_field(file, "SEAICE", **place))
+        return dataset
 
 
 def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset:

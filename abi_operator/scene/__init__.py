@@ -26,6 +26,8 @@ from .run import run as run
 from .scenario import check_absorption as check_absorption
 from .scenario import scenario as scenario
 from .simulate import simulate as simulate
+from .snow_and_ice import IceAlbedo as IceAlbedo
+from .snow_and_ice import check_ice_albedo as check_ice_albedo
 from .species import PlumeSpecification as PlumeSpecification
 from .species import classes_of as classes_of
 from .species import species_of as species_of

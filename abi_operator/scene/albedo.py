@@ -7,6 +7,7 @@ from ..files import InputError
 from ..radiance import THERMAL
 from .albedo_file import albedo_of_file, check_extent
 from .emissivity import Emissivity, check_emissivity, thermal_albedo
+from .snow_and_ice import IceAlbedo, check_ice_albedo, sea_ice_cover, with_snow_and_ice
 
 
 def surface_albedo(
@@ -15,12 +16,16 @@ def surface_albedo(
     albedo: xr.Dataset | None,
     ocean_albedo: float | None,
     emissivity: Emissivity | None = None,
+    *,
+    sea_ice_albedo: IceAlbedo | None = None,
+    snow_albedo: IceAlbedo | None = None,
 ) -> tuple[np.ndarray, dict[str, str | int]]:
     """Albedo by band (band, y, x), NaN where there is none [-]; and attributes that say whence.
 
     In C07 it is 1 - `emissivity` (`thermal_albedo`). In the other bands it is that of the albedo
     file (`albedo_of_file`); over water of the model's land mask `ocean_albedo`. Without a land
-    mask, `ocean_albedo` fills what the file leaves missing in all of the bands.
+    mask, `ocean_albedo` fills what the file leaves missing in all of the bands. What the model has
+    of sea ice and snow lies over it (`with_snow_and_ice`).
 
     Parameters
     ----------
@@ -34,6 +39,8 @@ def surface_albedo(
         One albedo for all bands but C07. [-]
     emissivity
         Of the ground in C07; see `thermal_albedo`.
+    sea_ice_albedo, snow_albedo
+        Of sea ice without snow, and of snow, in all bands but C07, where it lies. [-]
 
     Raises
     ------
@@ -42,9 +49,15 @@ def surface_albedo(
     """
     solar = tuple(band for band in bands if band not in THERMAL)
     check_ground(model, bands, albedo, ocean_albedo, emissivity)
-    attributes, found = {}, {}
+    check_ice_albedo(sea_ice_albedo, "sea ice")
+    check_ice_albedo(snow_albedo, "snow")
+    attributes: dict[str, str | int] = {}
+    found = {}
     if solar:
-        values, attributes = _solar_albedo(model, solar, albedo, ocean_albedo)
+        values, sources, counts = _solar_albedo(model, solar, albedo, ocean_albedo)
+        ice = with_snow_and_ice(values, model, solar, sea_ice_albedo, snow_albedo)
+        values, attributes = ice[0], {**counts, **ice[2]}
+        attributes["surface_albedo_source"] = "; ".join(sources + ice[1])
         found |= dict(zip(solar, values, strict=True))
     for band in bands:
         if band in THERMAL and emissivity is not None:
@@ -57,8 +70,8 @@ def _solar_albedo(
     bands: tuple[str, ...],
     albedo: xr.Dataset | None,
     ocean_albedo: float | None,
-) -> tuple[np.ndarray, dict[str, str | int]]:
-    """Albedo in bands of sunlight alone (band, y, x), and attributes that say whence."""
+) -> tuple[np.ndarray, list[str], dict[str, int]]:
+    """Albedo in bands of sunlight alone (band, y, x), whence it is, and of how many columns."""
     shape = (len(bands), model.sizes["y"], model.sizes["x"])
     values, sources, counts = np.full(shape, np.nan), [], {}
     water = _water(model) if ocean_albedo is not None else None
@@ -70,7 +83,7 @@ def _solar_albedo(
         values = np.where(missing if water is None else water, ocean_albedo, values)
         place = "water" if water is not None else "all columns" if albedo is None else "the rest"
         sources.append(f"{place} {ocean_albedo:g}")
-    return values, {"surface_albedo_source": "; ".join(sources), **counts}
+    return values, sources, counts
 
 
 def check_ground(
@@ -85,8 +98,8 @@ def check_ground(
     Parameters
     ----------
     coordinates
-        ``latitude`` and ``longitude`` (y, x) [degree] and perhaps ``land_mask``, as in a model
-        Dataset.
+        ``latitude`` and ``longitude`` (y, x) [degree] and perhaps ``land_mask`` and ``sea_ice``, as
+        in a model Dataset.
     bands
         Bands to be simulated.
     albedo
@@ -114,5 +127,10 @@ def check_ground(
 
 
 def _water(dataset: xr.Dataset) -> np.ndarray | None:
-    """True over water (y, x); None without a land mask."""
-    return dataset["land_mask"].values == 0 if "land_mask" in dataset else None
+    """True over water (y, x), also where it is frozen; None without a land mask.
+
+    Models call frozen sea land while they have it.
+    """
+    if "land_mask" not in dataset:
+        return None
+    return (dataset["land_mask"].values == 0) | (sea_ice_cover(dataset) > 0)

@@ -7,6 +7,7 @@ import xarray as xr
 
 from ..files import InputError
 from ..surface import EMISSIVITY_3900NM
+from .snow_and_ice import sea_ice_cover, snow_cover
 
 FROM_MODEL = "model"
 """The emissivity to name where the model's own is meant."""
@@ -51,8 +52,9 @@ def thermal_albedo(model: xr.Dataset, emissivity: Emissivity) -> tuple[np.ndarra
 
     MODIS has no albedo at 3.9 um. An emissivity that is a number or a type of surface is that of
     land where the model has a land mask, and water has its own; without a mask it is that of all
-    columns. The model's emissivity is of the whole thermal infrared, which is warned of: soil and
-    sand emit less at 3.9 um.
+    columns. Snow on the ground and ice on the sea have that of snow, for their share of a column
+    (ice without snow has 0.976 by Fresnel's law). The model's emissivity is of the whole thermal
+    infrared, which is warned of: soil and sand emit less at 3.9 um.
 
     Parameters
     ----------
@@ -70,10 +72,16 @@ def thermal_albedo(model: xr.Dataset, emissivity: Emissivity) -> tuple[np.ndarra
         )
         return 1 - model["surface_emissivity"].values, "the model's broadband one"
     value = EMISSIVITY_3900NM[emissivity] if isinstance(emissivity, str) else emissivity
-    shape = model["latitude"].shape
+    ice = sea_ice_cover(model)
     name = f"{value:g}" + (f" ({emissivity})" if isinstance(emissivity, str) else "")
-    if "land_mask" not in model:
-        return np.full(shape, 1 - value), f"{name} in all columns"
-    water = EMISSIVITY_3900NM["water"]
-    land = model["land_mask"].values > 0
-    return np.where(land, 1 - value, 1 - water), f"{name} over land, {water:g} over water"
+    if "land_mask" in model:
+        water = EMISSIVITY_3900NM["water"]
+        bare = np.where((model["land_mask"].values > 0) & (ice == 0), value, water)
+        source = f"{name} over land, {water:g} over water"
+    else:
+        bare, source = np.full(ice.shape, value), f"{name} in all columns"
+    snow = EMISSIVITY_3900NM["snow"]
+    frozen = np.where(ice > 0, ice, snow_cover(model))
+    if frozen.any():
+        source += f"; {snow:g} over snow and ice"
+    return 1 - ((1 - frozen) * bare + frozen * snow), source

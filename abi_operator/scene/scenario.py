@@ -22,6 +22,7 @@ from .droplet_number import DropletNumber
 from .emissivity import Emissivity
 from .gases import check_gases, gas_amounts, gases_attribute, level_temperature
 from .hydrometeors import Hydrometeors, hydrometeor_paths
+from .snow_and_ice import IceAlbedo
 from .species import PlumeSpecification, plume_variables
 from .standard_profile import StandardProfile, nearest_standard_atmosphere, standard_profile
 
@@ -31,6 +32,8 @@ def scenario(
     *,
     albedo: xr.Dataset | None = None,
     ocean_albedo: float | None = None,
+    sea_ice_albedo: IceAlbedo | None = None,
+    snow_albedo: IceAlbedo | None = None,
     emissivity: Emissivity | None = None,
     plumes: Mapping[str, PlumeSpecification] | None = None,
     satellite: str = "GOES-16",
@@ -61,6 +64,10 @@ def scenario(
     ocean_albedo
         Albedo of water, or of all that `albedo` lacks where the model has no land mask, in all
         bands but C07. [-]
+    sea_ice_albedo, snow_albedo
+        Of sea ice without snow, and of snow, where the model has them: a number for all bands but
+        C07, or a type in `surface.SNOW_AND_ICE_ALBEDO`. Columns with sea ice have no albedo without
+        it, those with snow that of the file; both are warned of. [-]
     emissivity
         Of the ground in C07, needed there; see `thermal_albedo`.
     plumes
@@ -114,7 +121,15 @@ def scenario(
         classes=None if hydrometeors is None else tuple(hydrometeors),
         microphysics=microphysics,
     )
-    ground, ground_sources = surface_albedo(model, bands, albedo, ocean_albedo, emissivity)
+    ground, ground_sources = surface_albedo(
+        model,
+        bands,
+        albedo,
+        ocean_albedo,
+        emissivity,
+        sea_ice_albedo=sea_ice_albedo,
+        snow_albedo=snow_albedo,
+    )
     position = {name: model[name].values for name in ("latitude", "longitude")}
     time = model["time"].values
     if satellite_longitude is None:

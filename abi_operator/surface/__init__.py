@@ -20,3 +20,5 @@ from .modis_to_abi import modis_to_abi as modis_to_abi
 from .ocean import Ocean as Ocean
 from .ocean import ocean as ocean
 from .ross_li import RossLi as RossLi
+from .snow_and_ice import SNOW_AND_ICE_ALBEDO as SNOW_AND_ICE_ALBEDO
+from .snow_and_ice import snow_and_ice_albedo as snow_and_ice_albedo
