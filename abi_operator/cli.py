@@ -82,6 +82,13 @@ def simulate(
     ocean_albedo: Annotated[
         float | None, typer.Option(min=0, max=1, help="Albedo of water, in all bands but C07.")
     ] = None,
+    land_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of land that the albedo file, if any, has none of: a number for all bands "
+            "but C07, or model (its own, broadband)."
+        ),
+    ] = None,
     sea_ice_albedo: Annotated[
         str | None,
         typer.Option(
@@ -102,7 +109,8 @@ def simulate(
     emissivity: Annotated[
         str | None,
         typer.Option(
-            help="Of the ground in C07: a number, model (its own, broadband), or one of "
+            help="Of the ground in C07: a number, model (its own, broadband), land-use (that of "
+            "each column's land use), or one of "
             f"{', '.join(EMISSIVITY_3900NM)}."
         ),
     ] = None,
@@ -149,6 +157,7 @@ def simulate(
         bands=names,
         albedo=albedo,
         ocean_albedo=ocean_albedo,
+        land_albedo=_number(land_albedo),
         sea_ice_albedo=_number(sea_ice_albedo),
         snow_albedo=_number(snow_albedo),
         broadband=broadband,

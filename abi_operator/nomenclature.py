@@ -88,6 +88,10 @@ MODEL: dict[str, Variable] = {
     "snow_cover": Variable(
         HORIZONTAL, "1", "share of the ground under snow", "surface_snow_area_fraction"
     ),
+    "broadband_albedo": Variable(
+        HORIZONTAL, "1", "albedo of the ground for all sunlight", "surface_albedo"
+    ),
+    "land_use": Variable(HORIZONTAL, "1", "number of the category of land use"),
     "snow_mass": Variable(HORIZONTAL, "kg m-2", "snow on the ground", "surface_snow_amount"),
 }
 

@@ -32,12 +32,15 @@ from .scene import (
     CLASSES,
     Emissivity,
     IceAlbedo,
+    LandAlbedo,
     PlumeSpecification,
     check_absorption,
     check_classes,
+    check_emissivity,
     check_gases,
     check_ground,
     check_ice_albedo,
+    check_land_albedo,
     check_microphysics,
     classes_present,
     completion_heights,
@@ -58,7 +61,11 @@ _SOURCES = {
 }
 
 # The same for how many columns something covers.
-_COVERS = {"sea_ice_count": "ice on the sea", "snow_count": "snow on the ground"}
+_COVERS = {
+    "last_resort_albedo_count": "land with the albedo of last resort",
+    "sea_ice_count": "ice on the sea",
+    "snow_count": "snow on the ground",
+}
 
 # Brightness temperatures that are black and white in a picture. [K]
 _GREYS = (320.0, 220.0)
@@ -92,7 +99,7 @@ class Request(NamedTuple):
         Bands to simulate, and whether broadband albedo may stand in for a missing one.
     emissivity
         Of the ground in C07, as `scene.scenario` takes it.
-    sea_ice_albedo, snow_albedo
+    land_albedo, sea_ice_albedo, snow_albedo
         As `scene.scenario` takes them. [-]
     gases, hydrometeors, microphysics
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
@@ -120,6 +127,7 @@ class Request(NamedTuple):
     satellite_longitude: float | None = None
     time: int | None = None
     num_streams: int = 8
+    land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None
     snow_albedo: IceAlbedo | None = None
 
@@ -188,9 +196,19 @@ def open_scene(request: Request) -> Scene:
     tops, present = [], set()
     for time in times:
         place = wrf_coordinates(request.wrf, time)
-        check_ground(place, request.bands, albedo, request.ocean_albedo, request.emissivity)
+        check_ground(
+            place,
+            request.bands,
+            albedo,
+            request.ocean_albedo,
+            request.emissivity,
+            request.land_albedo,
+        )
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
             model = read_wrf(request.wrf, time, rows)
+            check_land_albedo(request.land_albedo, model)
+            if set(request.bands) & set(THERMAL):
+                check_emissivity(request.emissivity, model)
             tops.append(highest_top(model))
             present.update(classes_present(model, request.microphysics))
     return Scene(
@@ -223,6 +241,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         scenario,
         albedo=scene.albedo,
         ocean_albedo=request.ocean_albedo,
+        land_albedo=request.land_albedo,
         sea_ice_albedo=request.sea_ice_albedo,
         snow_albedo=request.snow_albedo,
         emissivity=request.emissivity,

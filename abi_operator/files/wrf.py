@@ -53,6 +53,9 @@ VARIABLE_MAP = {
     "SEAICE": "sea_ice",
     "SNOWC": "snow_cover",
     "SNOW": "snow_mass",  # as liquid water
+    "ALBEDO": "broadband_albedo",
+    "IVGTYP": "land_use",
+    "LU_INDEX": "land_use",
 }
 """WRF's name of a variable: ours. Of two that are alternatives the latter is preferred."""
 
@@ -104,6 +107,8 @@ _TAKEN_AS_THEY_ARE = (
     "sea_ice",
     "snow_cover",
     "snow_mass",
+    "broadband_albedo",
+    "land_use",
 )
 
 _ADVICE = "give a WRF output file (wrfout_*) that holds them"
@@ -328,4 +333,6 @@ def _attributes(file: xr.Dataset) -> dict[str, str | int]:
     if "BOTTOM-TOP_GRID_DIMENSION" in file.attrs:
         num_levels = int(file.attrs["BOTTOM-TOP_GRID_DIMENSION"])
         attributes["bottom_top_levels_of_run"] = num_levels - 1
+    if "MMINLU" in file.attrs:
+        attributes["land_use_scheme"] = str(file.attrs["MMINLU"]).strip("\0 ")
     return attributes

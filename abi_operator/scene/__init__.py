@@ -16,11 +16,14 @@ from .condensate import CLASSES as CLASSES
 from .condensate import check_classes as check_classes
 from .condensate import classes_present as classes_present
 from .droplet_number import DropletNumber as DropletNumber
+from .emissivity import BY_LAND_USE as BY_LAND_USE
 from .emissivity import Emissivity as Emissivity
 from .emissivity import check_emissivity as check_emissivity
 from .gases import check_gases as check_gases
 from .gases import gases_of as gases_of
 from .hydrometeors import check_microphysics as check_microphysics
+from .land import LandAlbedo as LandAlbedo
+from .land import check_land_albedo as check_land_albedo
 from .run import row_blocks as row_blocks
 from .run import run as run
 from .scenario import check_absorption as check_absorption

@@ -22,6 +22,7 @@ from .droplet_number import DropletNumber
 from .emissivity import Emissivity
 from .gases import check_gases, gas_amounts, gases_attribute, level_temperature
 from .hydrometeors import Hydrometeors, hydrometeor_paths
+from .land import LandAlbedo
 from .snow_and_ice import IceAlbedo
 from .species import PlumeSpecification, plume_variables
 from .standard_profile import StandardProfile, nearest_standard_atmosphere, standard_profile
@@ -32,6 +33,7 @@ def scenario(
     *,
     albedo: xr.Dataset | None = None,
     ocean_albedo: float | None = None,
+    land_albedo: LandAlbedo | None = None,
     sea_ice_albedo: IceAlbedo | None = None,
     snow_albedo: IceAlbedo | None = None,
     emissivity: Emissivity | None = None,
@@ -64,6 +66,9 @@ def scenario(
     ocean_albedo
         Albedo of water, or of all that `albedo` lacks where the model has no land mask, in all
         bands but C07. [-]
+    land_albedo
+        Albedo of land that has none of `albedo`, in all bands but C07: a number, or ``"model"`` for
+        the model's own, of all sunlight. [-]
     sea_ice_albedo, snow_albedo
         Of sea ice without snow, and of snow, where the model has them: a number for all bands but
         C07, or a type in `surface.SNOW_AND_ICE_ALBEDO`. Columns with sea ice have no albedo without
@@ -127,6 +132,7 @@ def scenario(
         albedo,
         ocean_albedo,
         emissivity,
+        land_albedo=land_albedo,
         sea_ice_albedo=sea_ice_albedo,
         snow_albedo=snow_albedo,
     )

@@ -23,7 +23,8 @@ _TYPES = ", ".join(SNOW_AND_ICE_ALBEDO)
 _SNOW_TYPES = ", ".join(name for name in SNOW_AND_ICE_ALBEDO if name.endswith("snow"))
 _NO_ICE = (
     "the model has sea ice (SEAICE in WRF's files) and no albedo of it was named: its columns are "
-    f"not simulated (sea_ice_count tells how many); name one (--sea-ice-albedo), a number or {_TYPES}."
+    "not simulated (sea_ice_count tells how many); name one (--sea-ice-albedo), a number or "
+    f"{_TYPES}."
 )
 _BARE = (
     "snow lies on the ground of the model (SNOWC or SNOW in WRF's files; snow_count tells in how "

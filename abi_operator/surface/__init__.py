@@ -15,6 +15,7 @@ from .energy import Report as Report
 from .energy import directional_albedo as directional_albedo
 from .energy import reported as reported
 from .lambertian import Lambertian as Lambertian
+from .land_use import LAND_USE as LAND_USE
 from .modis_to_abi import MODIS_TO_ABI as MODIS_TO_ABI
 from .modis_to_abi import modis_to_abi as modis_to_abi
 from .ocean import Ocean as Ocean

@@ -130,6 +130,19 @@ def test_sea_ice_and_snow_are_read(write_wrf_twin):
     np.testing.assert_array_equal(wrf_coordinates(path, 1)["sea_ice"], extra["SEAICE"][1][1])
 
 
+def test_land_use_is_read_with_its_scheme(write_wrf_twin):
+    extra = {
+        name: (SURFACE, np.full((2, 3, 2), value, np.float32))
+        for name, value in {"IVGTYP": 10, "LU_INDEX": 7, "ALBEDO": 0.25}.items()
+    }
+    path = write_wrf_twin(extra=extra)
+    with netCDF4.Dataset(path, "a") as file:
+        file.MMINLU = "USGS"
+    dataset = read_wrf(path, 0)
+    assert (dataset["land_use"] == 7).all() and (dataset["broadband_albedo"] == 0.25).all()
+    assert dataset.attrs["land_use_scheme"] == "USGS"
+
+
 def test_optional_variables_are_absent_where_the_file_has_none(write_wrf_twin):
     dataset = read_wrf(write_wrf_twin(without=("PSFC",)), 0)
     for name in ("surface_pressure", "rain_mixing_ratio", "ice_mixing_ratio", "land_mask"):
