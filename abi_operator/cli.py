@@ -42,7 +42,7 @@ from .simulation import (
     simulate_scene,
 )
 from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_compiler_flags
-from .surface import EMISSIVITY_3900NM
+from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
 
 COMMANDS = "abi_operator.commands"
 """Group of the entry points by which other packages add commands."""
@@ -93,13 +93,35 @@ def simulate(
     ocean_albedo: Annotated[
         float | None, typer.Option(min=0, max=1, help="Albedo of water, in all bands but C07.")
     ] = None,
+    land_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of land that the albedo file, if any, has none of: a number for all bands "
+            "but C07, or model (its own, broadband)."
+        ),
+    ] = None,
+    sea_ice_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of sea ice, where the model has some: a number for all bands but C07, or "
+            f"one of {', '.join(SNOW_AND_ICE_ALBEDO)}. Without it such columns are left out."
+        ),
+    ] = None,
+    snow_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of the model's snow on the ground, likewise. Without it the ground has "
+            "that of the file."
+        ),
+    ] = None,
     broadband: Annotated[
         bool, typer.Option(help="Let broadband albedo stand in for missing spectral bands.")
     ] = False,
     emissivity: Annotated[
         str | None,
         typer.Option(
-            help="Of the ground in C07: a number, model (its own, broadband), or one of "
+            help="Of the ground in C07: a number, model (its own, broadband), land-use (that of "
+            "each column's land use), or one of "
             f"{', '.join(EMISSIVITY_3900NM)}."
         ),
     ] = None,
@@ -156,6 +178,9 @@ def simulate(
         bands=names,
         albedo=albedo,
         ocean_albedo=ocean_albedo,
+        land_albedo=_number(land_albedo),
+        sea_ice_albedo=_number(sea_ice_albedo),
+        snow_albedo=_number(snow_albedo),
         broadband=broadband,
         emissivity=_number(emissivity),
         plume=plume,

@@ -84,6 +84,15 @@ MODEL: dict[str, Variable] = {
         HORIZONTAL, "1", "broadband emissivity of the ground", "surface_longwave_emissivity"
     ),
     "land_mask": Variable(HORIZONTAL, "1", "1 over land, 0 over water", "land_binary_mask"),
+    "sea_ice": Variable(HORIZONTAL, "1", "share of the water that is ice", "sea_ice_area_fraction"),
+    "snow_cover": Variable(
+        HORIZONTAL, "1", "share of the ground under snow", "surface_snow_area_fraction"
+    ),
+    "broadband_albedo": Variable(
+        HORIZONTAL, "1", "albedo of the ground for all sunlight", "surface_albedo"
+    ),
+    "land_use": Variable(HORIZONTAL, "1", "number of the category of land use"),
+    "snow_mass": Variable(HORIZONTAL, "kg m-2", "snow on the ground", "surface_snow_amount"),
 }
 
 SCENARIO: dict[str, Variable] = {

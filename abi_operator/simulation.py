@@ -34,11 +34,16 @@ from .scene import (
     CLASSES,
     DropletNumber,
     Emissivity,
+    IceAlbedo,
+    LandAlbedo,
     PlumeSpecification,
     check_absorption,
     check_classes,
+    check_emissivity,
     check_gases,
     check_ground,
+    check_ice_albedo,
+    check_land_albedo,
     check_microphysics,
     check_sight,
     classes_present,
@@ -58,6 +63,13 @@ _SOURCES = {
     "surface_albedo_source": "albedo of the ground",
     "emissivity_source": "emissivity of the ground in C07",
     "surface_temperature_source": "temperature of the ground",
+}
+
+# The same for how many columns something covers.
+_COVERS = {
+    "last_resort_albedo_count": "land with the albedo of last resort",
+    "sea_ice_count": "ice on the sea",
+    "snow_count": "snow on the ground",
 }
 
 # Brightness temperatures that are black and white in a picture. [K]
@@ -92,6 +104,8 @@ class Request(NamedTuple):
         Bands to simulate, and whether broadband albedo may stand in for a missing one.
     emissivity
         Of the ground in C07, as `scene.scenario` takes it.
+    land_albedo, sea_ice_albedo, snow_albedo
+        As `scene.scenario` takes them. [-]
     gases, hydrometeors, microphysics, droplet_number
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
     satellite, satellite_longitude
@@ -119,6 +133,9 @@ class Request(NamedTuple):
     satellite_longitude: float | None = None
     time: int | None = None
     num_streams: int = 8
+    land_albedo: LandAlbedo | None = None
+    sea_ice_albedo: IceAlbedo | None = None
+    snow_albedo: IceAlbedo | None = None
 
 
 class Scene(NamedTuple):
@@ -167,6 +184,8 @@ def open_scene(request: Request) -> Scene:
     check_absorption(request.satellite, request.bands, check_gases(request.gases))
     check_classes(request.hydrometeors or ())
     check_microphysics(request.microphysics)
+    check_ice_albedo(request.sea_ice_albedo, "sea ice")
+    check_ice_albedo(request.snow_albedo, "snow")
     coordinates = wrf_coordinates(request.wrf, request.time or 0)
     shape = coordinates.sizes["y"], coordinates.sizes["x"]
     times = tuple(range(coordinates.sizes["time"])) if request.time is None else (request.time,)
@@ -184,9 +203,19 @@ def open_scene(request: Request) -> Scene:
     for time in times:
         place = wrf_coordinates(request.wrf, time)
         check_sight(place, request.satellite, request.satellite_longitude)
-        check_ground(place, request.bands, albedo, request.ocean_albedo, request.emissivity)
+        check_ground(
+            place,
+            request.bands,
+            albedo,
+            request.ocean_albedo,
+            request.emissivity,
+            request.land_albedo,
+        )
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
             model = read_wrf(request.wrf, time, rows)
+            check_land_albedo(request.land_albedo, model)
+            if set(request.bands) & set(THERMAL):
+                check_emissivity(request.emissivity, model)
             if request.droplet_number is not None:
                 request.droplet_number.over(model)
             tops.append(highest_top(model))
@@ -221,6 +250,9 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         scenario,
         albedo=scene.albedo,
         ocean_albedo=request.ocean_albedo,
+        land_albedo=request.land_albedo,
+        sea_ice_albedo=request.sea_ice_albedo,
+        snow_albedo=request.snow_albedo,
         emissivity=request.emissivity,
         plumes=scene.plumes,
         satellite=request.satellite,
@@ -317,6 +349,9 @@ def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
     for name, words in _SOURCES.items():
         if name in account:
             yield f"{words}: {account[name]}"
+    for name, words in _COVERS.items():
+        if name in account:
+            yield f"{words}: {account[name]} columns"
     if account["unsimulated_condensate_share"]:
         share = 100 * float(account["unsimulated_condensate_share"])
         kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")

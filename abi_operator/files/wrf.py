@@ -53,6 +53,12 @@ VARIABLE_MAP = {
     "EMISS": "surface_emissivity",
     "XLAND": "land_mask",  # 1 land, 2 water
     "LANDMASK": "land_mask",  # 1 land, 0 water
+    "SEAICE": "sea_ice",
+    "SNOWC": "snow_cover",
+    "SNOW": "snow_mass",  # as liquid water
+    "ALBEDO": "broadband_albedo",
+    "IVGTYP": "land_use",
+    "LU_INDEX": "land_use",
 }
 """WRF's name of a variable: ours. Of two that are alternatives the latter is preferred."""
 
@@ -94,6 +100,11 @@ _TAKEN_AS_THEY_ARE = (
     "surface_pressure",
     "surface_temperature",
     "surface_emissivity",
+    "sea_ice",
+    "snow_cover",
+    "snow_mass",
+    "broadband_albedo",
+    "land_use",
 )
 
 _ADVICE = "give a WRF output file (wrfout_*) that holds them"
@@ -114,7 +125,7 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
     -------
     xarray.Dataset
         Coordinates ``time``, of the whole file, and ``latitude`` and ``longitude`` (y, x)
-        [degree]; ``land_mask`` if the file has one. Attributes ``title``,
+        [degree]; ``land_mask`` and ``sea_ice`` if the file has them. Attributes ``title``,
         ``microphysics_scheme`` (a name of `SCHEMES`, or ``"MP_PHYSICS=99"`` for a number that is
         not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
         fewer) and ``moving_nest`` (1 where positions differ from time to time, else 0).
@@ -132,7 +143,11 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
             attrs=_attributes(file) | {"moving_nest": int(_moves(file))},
         )
         land_mask = _land_mask(file, **place)
-        return dataset if land_mask is None else dataset.assign(land_mask=land_mask)
+        if land_mask is not None:
+            dataset = dataset.assign(land_mask=land_mask)
+        if "SEAICE" in file:
+            dataset = dataset.assign(sea_ice=_field(file, "SEAICE", **place))
+        return dataset
 
 
 def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset:
@@ -325,4 +340,6 @@ def _attributes(file: xr.Dataset) -> dict[str, str | int]:
     if "BOTTOM-TOP_GRID_DIMENSION" in file.attrs:
         num_levels = int(file.attrs["BOTTOM-TOP_GRID_DIMENSION"])
         attributes["bottom_top_levels_of_run"] = num_levels - 1
+    if "MMINLU" in file.attrs:
+        attributes["land_use_scheme"] = str(file.attrs["MMINLU"]).strip("\0 ")
     return attributes

@@ -7,6 +7,8 @@ from ..files import InputError
 from ..radiance import THERMAL
 from .albedo_file import albedo_of_file, check_extent
 from .emissivity import Emissivity, check_emissivity, thermal_albedo
+from .land import LandAlbedo, check_land_albedo, with_last_resort
+from .snow_and_ice import IceAlbedo, check_ice_albedo, sea_ice_cover, with_snow_and_ice
 
 
 def surface_albedo(
@@ -15,12 +17,18 @@ def surface_albedo(
     albedo: xr.Dataset | None,
     ocean_albedo: float | None,
     emissivity: Emissivity | None = None,
+    *,
+    land_albedo: LandAlbedo | None = None,
+    sea_ice_albedo: IceAlbedo | None = None,
+    snow_albedo: IceAlbedo | None = None,
 ) -> tuple[np.ndarray, dict[str, str | int]]:
     """Albedo by band (band, y, x), NaN where there is none [-]; and attributes that say whence.
 
     In C07 it is 1 - `emissivity` (`thermal_albedo`). In the other bands it is that of the albedo
     file (`albedo_of_file`); over water of the model's land mask `ocean_albedo`. Without a land
-    mask, `ocean_albedo` fills what the file leaves missing in all of the bands.
+    mask, `ocean_albedo` fills what the file leaves missing in all of the bands. Land that still
+    lacks an albedo in some band has `land_albedo` there (`with_last_resort`). What the model has of
+    sea ice and snow lies over all of it (`with_snow_and_ice`).
 
     Parameters
     ----------
@@ -34,6 +42,10 @@ def surface_albedo(
         One albedo for all bands but C07. [-]
     emissivity
         Of the ground in C07; see `thermal_albedo`.
+    land_albedo
+        Of land that the file, if any, knows no albedo of, in all bands but C07. [-]
+    sea_ice_albedo, snow_albedo
+        Of sea ice without snow, and of snow, in all bands but C07, where it lies. [-]
 
     Raises
     ------
@@ -41,10 +53,16 @@ def surface_albedo(
         Where an albedo is missing, or the file does not reach as far as the columns that need it.
     """
     solar = tuple(band for band in bands if band not in THERMAL)
-    check_ground(model, bands, albedo, ocean_albedo, emissivity)
-    attributes, found = {}, {}
+    check_ground(model, bands, albedo, ocean_albedo, emissivity, land_albedo)
+    check_ice_albedo(sea_ice_albedo, "sea ice")
+    check_ice_albedo(snow_albedo, "snow")
+    attributes: dict[str, str | int] = {}
+    found = {}
     if solar:
-        values, attributes = _solar_albedo(model, solar, albedo, ocean_albedo)
+        values, sources, counts = _solar_albedo(model, solar, albedo, ocean_albedo, land_albedo)
+        ice = with_snow_and_ice(values, model, solar, sea_ice_albedo, snow_albedo)
+        values = ice[0]
+        attributes |= {"surface_albedo_source": "; ".join(sources + ice[1]), **counts, **ice[2]}
         found |= dict(zip(solar, values, strict=True))
     for band in bands:
         if band in THERMAL and emissivity is not None:
@@ -57,20 +75,26 @@ def _solar_albedo(
     bands: tuple[str, ...],
     albedo: xr.Dataset | None,
     ocean_albedo: float | None,
-) -> tuple[np.ndarray, dict[str, str | int]]:
-    """Albedo in bands of sunlight alone (band, y, x), and attributes that say whence."""
+    land_albedo: LandAlbedo | None,
+) -> tuple[np.ndarray, list[str], dict[str, int]]:
+    """Albedo in bands of sunlight alone (band, y, x), whence it is, and of how many columns."""
     shape = (len(bands), model.sizes["y"], model.sizes["x"])
     values, sources, counts = np.full(shape, np.nan), [], {}
-    water = _water(model) if ocean_albedo is not None else None
+    water = _water(model)
     if albedo is not None:
-        needed = np.full(shape[1:], True) if water is None else ~water
+        spared = water if water is not None and ocean_albedo is not None else np.zeros(1, bool)
+        needed = np.broadcast_to(~spared, shape[1:])
         values, sources, counts = albedo_of_file(model, bands, albedo, needed)
     if ocean_albedo is not None:
         missing = np.isnan(values).all(axis=0)
         values = np.where(missing if water is None else water, ocean_albedo, values)
         place = "water" if water is not None else "all columns" if albedo is None else "the rest"
         sources.append(f"{place} {ocean_albedo:g}")
-    return values, {"surface_albedo_source": "; ".join(sources), **counts}
+    if land_albedo is not None:
+        land = np.full(shape[1:], True) if water is None else ~water
+        values, source, filled = with_last_resort(values, model, land, land_albedo)
+        sources, counts = [*sources, source], counts | filled
+    return values, sources, counts
 
 
 def check_ground(
@@ -79,14 +103,15 @@ def check_ground(
     albedo: xr.Dataset | None,
     ocean_albedo: float | None,
     emissivity: Emissivity | None = None,
+    land_albedo: LandAlbedo | None = None,
 ) -> None:
     """Raise `InputError` where there is no albedo, or the file's cells do not cover the scene.
 
     Parameters
     ----------
     coordinates
-        ``latitude`` and ``longitude`` (y, x) [degree] and perhaps ``land_mask``, as in a model
-        Dataset.
+        ``latitude`` and ``longitude`` (y, x) [degree] and perhaps ``land_mask`` and ``sea_ice``, as
+        in a model Dataset.
     bands
         Bands to be simulated.
     albedo
@@ -95,16 +120,20 @@ def check_ground(
         If given, water of the land mask needs no file. [-]
     emissivity
         Of the ground in C07, needed there.
+    land_albedo
+        If given, what the file does not reach needs none. [-]
     """
+    check_land_albedo(land_albedo)
     if set(bands) & set(THERMAL):
         check_emissivity(emissivity)
     if set(bands) <= set(THERMAL):
         return
-    if albedo is None and ocean_albedo is None:
+    if albedo is None and ocean_albedo is None and land_albedo is None:
         raise InputError(
-            "the ground has no albedo; name an albedo file, an albedo of the ocean, or both."
+            "the ground has no albedo; name an albedo file, an albedo of the ocean, or both, or, "
+            "for want of a file, an albedo of land."
         )
-    if albedo is None:
+    if albedo is None or land_albedo is not None:
         return
     water = _water(coordinates) if ocean_albedo is not None else None
     needed = np.full(coordinates["latitude"].shape, True) if water is None else ~water
@@ -114,5 +143,10 @@ def check_ground(
 
 
 def _water(dataset: xr.Dataset) -> np.ndarray | None:
-    """True over water (y, x); None without a land mask."""
-    return dataset["land_mask"].values == 0 if "land_mask" in dataset else None
+    """True over water (y, x), also where it is frozen; None without a land mask.
+
+    Models call frozen sea land while they have it.
+    """
+    if "land_mask" not in dataset:
+        return None
+    return (dataset["land_mask"].values == 0) | (sea_ice_cover(dataset) > 0)

@@ -24,7 +24,8 @@ def albedo_of_file(
     It is that of the scene's day, or else of the nearest. A column whose cell is larger than the
     file's gets the mean of those that have a value in a band, of all whose centres lie in it, and
     none where less than `LEAST_SHARE` have one. In smaller cells, and where nothing tells how large
-    they are (a single row or line of columns), it is that of the nearest cell.
+    they are (a single row or line of columns), it is that of the nearest cell. Columns that the
+    file does not reach have none.
 
     Parameters
     ----------
@@ -41,7 +42,8 @@ def albedo_of_file(
     of_day = _nearest_time(albedo, model["time"].values)
     if bands != tuple(of_day["band"].values):  # it would be a copy
         of_day = of_day.sel(band=list(bands))
-    values, date = _nearest_cell(of_day, model), _date(of_day)
+    beside = ~_reached(model, albedo)
+    values, date = np.where(beside, np.nan, _nearest_cell(of_day, model)), _date(of_day)
     means = _means(of_day, model)
     if means is None:
         return (
@@ -49,7 +51,8 @@ def albedo_of_file(
             [f"nearest cell of the albedo file's {date}"],
             {"nearest_albedo_count": int(needed.sum())},
         )
-    averaged, single = means.larger & needed, ~means.larger & needed
+    larger = means.larger & ~beside
+    averaged, single = larger & needed, ~larger & needed
     sources = []
     if averaged.any():
         sources.append(f"mean of the albedo file's {date} over each column's cell")
@@ -60,7 +63,16 @@ def albedo_of_file(
         "incomplete_mean_albedo_count": int((averaged & (means.num_missing > 0)).sum()),
         "nearest_albedo_count": int(single.sum()),
     }
-    return np.where(means.larger, means.mean, values), sources, counts
+    return np.where(larger, means.mean, values), sources, counts
+
+
+def _reached(model: xr.Dataset, albedo: xr.Dataset) -> np.ndarray:
+    """True for columns in the cells of a file (y, x)."""
+    south, north = _edges(albedo["lat"].values)
+    west, east = _edges(albedo["lon"].values)
+    latitude = model["latitude"].values
+    longitude = _about_the_file(model["longitude"].values, albedo)
+    return (latitude >= south) & (latitude <= north) & (longitude >= west) & (longitude <= east)
 
 
 def check_extent(coordinates: xr.Dataset, albedo: xr.Dataset, needed: np.ndarray) -> None:

@@ -7,12 +7,14 @@ import xarray as xr
 
 from ..files import InputError
 from ..surface import EMISSIVITY_3900NM
+from .land import FROM_MODEL, emissivity_by_land_use
+from .snow_and_ice import sea_ice_cover, snow_cover
 
-FROM_MODEL = "model"
-"""The emissivity to name where the model's own is meant."""
+BY_LAND_USE = "land-use"
+"""The emissivity to name where that of each column's land use is meant."""
 
 Emissivity = float | str
-"""A number [-], a type of surface in `surface.EMISSIVITY_3900NM`, or `FROM_MODEL`."""
+"""A number [-], a type in `surface.EMISSIVITY_3900NM`, `FROM_MODEL` or `BY_LAND_USE`."""
 
 
 def check_emissivity(emissivity: Emissivity | None, model: xr.Dataset | None = None) -> None:
@@ -28,7 +30,8 @@ def check_emissivity(emissivity: Emissivity | None, model: xr.Dataset | None = N
     if emissivity is None:
         raise InputError(
             "C07 needs the emissivity of the ground: name a number, a type of surface "
-            f"({', '.join(EMISSIVITY_3900NM)}), or {FROM_MODEL!r} for the model's own."
+            f"({', '.join(EMISSIVITY_3900NM)}), {BY_LAND_USE!r} for that of each column's land "
+            f"use, or {FROM_MODEL!r} for the model's own."
         )
     if emissivity == FROM_MODEL:
         if model is not None and "surface_emissivity" not in model:
@@ -36,11 +39,15 @@ def check_emissivity(emissivity: Emissivity | None, model: xr.Dataset | None = N
                 "the model has no emissivity of its own (EMISS in WRF's files); name a number or a "
                 "type of surface."
             )
+    elif emissivity == BY_LAND_USE:
+        if model is not None:
+            emissivity_by_land_use(model)
     elif isinstance(emissivity, str):
         if emissivity not in EMISSIVITY_3900NM:
             raise InputError(
                 f"no emissivity is known of {emissivity!r}; name a number, one of "
-                f"{', '.join(EMISSIVITY_3900NM)}, or {FROM_MODEL!r} for the model's own."
+                f"{', '.join(EMISSIVITY_3900NM)}, {BY_LAND_USE!r} for that of each column's land "
+                f"use, or {FROM_MODEL!r} for the model's own."
             )
     elif not 0 <= emissivity <= 1:
         raise InputError(f"the emissivity is {emissivity:g}; it must be 0 to 1.")
@@ -51,8 +58,10 @@ def thermal_albedo(model: xr.Dataset, emissivity: Emissivity) -> tuple[np.ndarra
 
     MODIS has no albedo at 3.9 um. An emissivity that is a number or a type of surface is that of
     land where the model has a land mask, and water has its own; without a mask it is that of all
-    columns. The model's emissivity is of the whole thermal infrared, which is warned of: soil and
-    sand emit less at 3.9 um.
+    columns. By land use each column has that of its own type of surface, water among them. Snow on
+    the ground and ice on the sea have that of snow, for their share of a column (ice without snow
+    has 0.976 by Fresnel's law). The model's emissivity is of the whole thermal infrared, which is
+    warned of: soil and sand emit less at 3.9 um.
 
     Parameters
     ----------
@@ -69,11 +78,24 @@ def thermal_albedo(model: xr.Dataset, emissivity: Emissivity) -> tuple[np.ndarra
             stacklevel=2,
         )
         return 1 - model["surface_emissivity"].values, "the model's broadband one"
-    value = EMISSIVITY_3900NM[emissivity] if isinstance(emissivity, str) else emissivity
-    shape = model["latitude"].shape
-    name = f"{value:g}" + (f" ({emissivity})" if isinstance(emissivity, str) else "")
-    if "land_mask" not in model:
-        return np.full(shape, 1 - value), f"{name} in all columns"
-    water = EMISSIVITY_3900NM["water"]
-    land = model["land_mask"].values > 0
-    return np.where(land, 1 - value, 1 - water), f"{name} over land, {water:g} over water"
+    if emissivity == BY_LAND_USE:
+        value, name = (
+            emissivity_by_land_use(model),
+            f"by land use ({model.attrs['land_use_scheme']})",
+        )
+    elif isinstance(emissivity, str):
+        value = EMISSIVITY_3900NM[emissivity]
+        name = f"{value:g} ({emissivity})"
+    else:
+        value, name = emissivity, f"{emissivity:g}"
+    ice, water = sea_ice_cover(model), EMISSIVITY_3900NM["water"]
+    if "land_mask" in model:
+        bare = np.where((model["land_mask"].values > 0) & (ice == 0), value, water)
+        source = f"{name} over land, {water:g} over water"
+    else:
+        bare, source = np.full(ice.shape, value), f"{name} in all columns"
+    snow = EMISSIVITY_3900NM["snow"]
+    frozen = np.where(ice > 0, ice, snow_cover(model))
+    if frozen.any():
+        source += f"; {snow:g} over snow and ice"
+    return 1 - ((1 - frozen) * bare + frozen * snow), source

@@ -28,6 +28,8 @@ from .droplet_number import DropletNumber
 from .emissivity import Emissivity
 from .gases import check_gases, gas_amounts, gases_attribute, level_temperature
 from .hydrometeors import Hydrometeors, hydrometeor_paths
+from .land import LandAlbedo
+from .snow_and_ice import IceAlbedo
 from .species import PlumeSpecification, plume_variables
 from .standard_profile import StandardProfile, nearest_standard_atmosphere, standard_profile
 
@@ -37,6 +39,9 @@ def scenario(
     *,
     albedo: xr.Dataset | None = None,
     ocean_albedo: float | None = None,
+    land_albedo: LandAlbedo | None = None,
+    sea_ice_albedo: IceAlbedo | None = None,
+    snow_albedo: IceAlbedo | None = None,
     emissivity: Emissivity | None = None,
     plumes: Mapping[str, PlumeSpecification] | None = None,
     satellite: str = "GOES-16",
@@ -67,6 +72,13 @@ def scenario(
     ocean_albedo
         Albedo of water, or of all that `albedo` lacks where the model has no land mask, in all
         bands but C07. [-]
+    land_albedo
+        Albedo of land that has none of `albedo`, in all bands but C07: a number, or ``"model"`` for
+        the model's own, of all sunlight. [-]
+    sea_ice_albedo, snow_albedo
+        Of sea ice without snow, and of snow, where the model has them: a number for all bands but
+        C07, or a type in `surface.SNOW_AND_ICE_ALBEDO`. Columns with sea ice have no albedo without
+        it, those with snow that of the file; both are warned of. [-]
     emissivity
         Of the ground in C07, needed there; see `thermal_albedo`.
     plumes
@@ -120,7 +132,16 @@ def scenario(
         classes=None if hydrometeors is None else tuple(hydrometeors),
         microphysics=microphysics,
     )
-    ground, ground_sources = surface_albedo(model, bands, albedo, ocean_albedo, emissivity)
+    ground, ground_sources = surface_albedo(
+        model,
+        bands,
+        albedo,
+        ocean_albedo,
+        emissivity,
+        land_albedo=land_albedo,
+        sea_ice_albedo=sea_ice_albedo,
+        snow_albedo=snow_albedo,
+    )
     position = {name: model[name].values for name in ("latitude", "longitude")}
     time = model["time"].values
     if satellite_longitude is None:

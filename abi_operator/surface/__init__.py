@@ -15,8 +15,11 @@ from .energy import Report as Report
 from .energy import directional_albedo as directional_albedo
 from .energy import reported as reported
 from .lambertian import Lambertian as Lambertian
+from .land_use import LAND_USE as LAND_USE
 from .modis_to_abi import MODIS_TO_ABI as MODIS_TO_ABI
 from .modis_to_abi import modis_to_abi as modis_to_abi
 from .ocean import Ocean as Ocean
 from .ocean import ocean as ocean
 from .ross_li import RossLi as RossLi
+from .snow_and_ice import SNOW_AND_ICE_ALBEDO as SNOW_AND_ICE_ALBEDO
+from .snow_and_ice import snow_and_ice_albedo as snow_and_ice_albedo

@@ -120,6 +120,29 @@ def test_land_mask_is_one_over_land(write_wrf_twin, name, values, expected):
         np.testing.assert_array_equal(dataset["land_mask"], np.broadcast_to(expected, (3, 2)))
 
 
+def test_sea_ice_and_snow_are_read(write_wrf_twin):
+    rng = np.random.default_rng(7)
+    names = {"SEAICE": "sea_ice", "SNOWC": "snow_cover", "SNOW": "snow_mass"}
+    extra = {name: (SURFACE, rng.uniform(0, 1, (2, 3, 2)).astype(np.float32)) for name in names}
+    path = write_wrf_twin(extra=extra)
+    for name, ours in names.items():
+        np.testing.assert_array_equal(read_wrf(path, 1)[ours], extra[name][1][1])
+    np.testing.assert_array_equal(wrf_coordinates(path, 1)["sea_ice"], extra["SEAICE"][1][1])
+
+
+def test_land_use_is_read_with_its_scheme(write_wrf_twin):
+    extra = {
+        name: (SURFACE, np.full((2, 3, 2), value, np.float32))
+        for name, value in {"IVGTYP": 10, "LU_INDEX": 7, "ALBEDO": 0.25}.items()
+    }
+    path = write_wrf_twin(extra=extra)
+    with netCDF4.Dataset(path, "a") as file:
+        file.MMINLU = "USGS"
+    dataset = read_wrf(path, 0)
+    assert (dataset["land_use"] == 7).all() and (dataset["broadband_albedo"] == 0.25).all()
+    assert dataset.attrs["land_use_scheme"] == "USGS"
+
+
 def test_optional_variables_are_absent_where_the_file_has_none(write_wrf_twin):
     dataset = read_wrf(write_wrf_twin(without=("PSFC",)), 0)
     for name in ("surface_pressure", "rain_mixing_ratio", "ice_mixing_ratio", "land_mask"):
