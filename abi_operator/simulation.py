@@ -5,7 +5,7 @@ writes the result and pictures of every time.
 """
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -17,13 +17,13 @@ import xarray as xr
 from .bands import GRASSO2013
 from .files import (
     ResultWriter,
+    WrfSeries,
     note_files,
     noted_files,
+    open_wrf_series,
     read_mcd43a1,
     read_plume,
     read_result,
-    read_wrf,
-    wrf_coordinates,
 )
 from .nomenclature import QUALITY_FLAGS
 from .optics import ALL_GASES, ash, smoke
@@ -76,7 +76,7 @@ class Request(NamedTuple):
     Parameters
     ----------
     wrf
-        Output of WRF, with one time or more.
+        Output of WRF, one file or more, as `files.open_wrf_series` takes them.
     albedo
         MODIS albedo, as `files.read_mcd43a1` takes it.
     ocean_albedo
@@ -94,12 +94,12 @@ class Request(NamedTuple):
     satellite, satellite_longitude
         Name; degrees, east positive, where it does not stand at its usual place.
     time
-        Index of the one time to simulate; None for all. [-]
+        Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
     num_streams
         Streams of the solver.
     """
 
-    wrf: Path
+    wrf: Path | Sequence[Path]
     albedo: Path | None = None
     ocean_albedo: float | None = None
     plume: Path | None = None
@@ -113,7 +113,7 @@ class Request(NamedTuple):
     microphysics: str | None = None
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
-    time: int | None = None
+    time: int | str | None = None
     num_streams: int = 8
 
 
@@ -124,8 +124,10 @@ class Scene(NamedTuple):
     ----------
     request
         What was asked for.
+    series
+        As `files.open_wrf_series` returns.
     coordinates
-        As `files.wrf_coordinates` returns.
+        As `files.wrf_coordinates` returns, of all times and the place of the first one simulated.
     albedo, plumes
         What was read.
     chosen_times
@@ -139,6 +141,7 @@ class Scene(NamedTuple):
     """
 
     request: Request
+    series: WrfSeries
     coordinates: xr.Dataset
     albedo: xr.Dataset | None
     plumes: dict[str, PlumeSpecification]
@@ -163,9 +166,10 @@ def open_scene(request: Request) -> Scene:
     check_absorption(request.satellite, request.bands, check_gases(request.gases))
     check_classes(request.hydrometeors or ())
     check_microphysics(request.microphysics)
-    coordinates = wrf_coordinates(request.wrf, request.time or 0)
+    series = open_wrf_series(request.wrf)
+    times = series.find(request.time)
+    coordinates = series.coordinates(times[0])
     shape = coordinates.sizes["y"], coordinates.sizes["x"]
-    times = tuple(range(coordinates.sizes["time"])) if request.time is None else (request.time,)
     plumes = {}
     if request.plume is not None:
         brightness = read_plume(request.plume, shape)
@@ -178,14 +182,15 @@ def open_scene(request: Request) -> Scene:
         albedo = read_mcd43a1(request.albedo, solar, broadband=request.broadband)
     tops, present = [], set()
     for time in times:
-        place = wrf_coordinates(request.wrf, time)
+        place = series.coordinates(time)
         check_ground(place, request.bands, albedo, request.ocean_albedo, request.emissivity)
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
-            model = read_wrf(request.wrf, time, rows)
+            model = series.read(time, rows)
             tops.append(highest_top(model))
             present.update(classes_present(model, request.microphysics))
     return Scene(
         request,
+        series,
         coordinates,
         albedo,
         plumes,
@@ -227,7 +232,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
     )
 
     def read_block(time: int, rows: slice) -> xr.Dataset:
-        return specify(read_wrf(request.wrf, scene.chosen_times[time], rows), rows=rows)
+        return specify(scene.series.read(scene.chosen_times[time], rows), rows=rows)
 
     with ResultWriter(
         folder / RESULT,
@@ -243,7 +248,9 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
             num_streams=request.num_streams,
             block_columns=_BLOCK_COLUMNS,
         )
-        files = {"wrf": request.wrf, "albedo": request.albedo, "plume": request.plume}
+        wrf = dict.fromkeys(scene.series.places[time][0].name for time in scene.chosen_times)
+        account["wrf_file"] = "; ".join(wrf)
+        files = {"albedo": request.albedo, "plume": request.plume}
         account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:
