@@ -79,10 +79,20 @@ def _print(report: Report, out: Path, before: list[str]) -> None:
 
 
 def simulate(
-    wrf: Annotated[Path, typer.Argument(metavar="WRFOUT", help="Output of WRF, any times.")],
+    wrf: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="WRFOUT...",
+            help="Output of WRF: one file or more of one domain, any times, or patterns of names.",
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="Folder for the result and its pictures.")],
     time: Annotated[
-        int | None, typer.Option(min=0, help="The one time to simulate, counted from 0.")
+        str | None,
+        typer.Option(
+            help="Times to simulate, as 2005-08-28T12:00 or 2005-08-28 for those of a day, or "
+            "counted from 0; several by commas. All without."
+        ),
     ] = None,
     bands: Annotated[
         str, typer.Option(help=f"Bands to simulate, of {', '.join(BANDS)}; all: C01 to C07.")

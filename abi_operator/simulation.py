@@ -5,7 +5,7 @@ writes the result and pictures of every time.
 """
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -17,13 +17,13 @@ import xarray as xr
 from .bands import GRASSO2013
 from .files import (
     ResultWriter,
+    WrfSeries,
     note_files,
     noted_files,
+    open_wrf_series,
     read_mcd43a1,
     read_plume,
     read_result,
-    read_wrf,
-    wrf_coordinates,
 )
 from .nomenclature import QUALITY_FLAGS
 from .optics import ALL_GASES, ash, smoke
@@ -91,7 +91,7 @@ class Request(NamedTuple):
     Parameters
     ----------
     wrf
-        Output of WRF, with one time or more.
+        Output of WRF, one file or more, as `files.open_wrf_series` takes them.
     albedo
         MODIS albedo, as `files.read_mcd43a1` takes it.
     ocean_albedo
@@ -111,12 +111,12 @@ class Request(NamedTuple):
     satellite, satellite_longitude
         Name; degrees, east positive, where it does not stand at its usual place.
     time
-        Index of the one time to simulate; None for all. [-]
+        Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
     num_streams
         Streams of the solver.
     """
 
-    wrf: Path
+    wrf: Path | Sequence[Path]
     albedo: Path | None = None
     ocean_albedo: float | None = None
     plume: Path | None = None
@@ -131,7 +131,7 @@ class Request(NamedTuple):
     droplet_number: DropletNumber | None = None
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
-    time: int | None = None
+    time: int | str | None = None
     num_streams: int = 8
     land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None
@@ -145,8 +145,10 @@ class Scene(NamedTuple):
     ----------
     request
         What was asked for.
+    series
+        As `files.open_wrf_series` returns.
     coordinates
-        As `files.wrf_coordinates` returns.
+        As `files.wrf_coordinates` returns, of all times and the place of the first one simulated.
     albedo, plumes
         What was read.
     chosen_times
@@ -160,6 +162,7 @@ class Scene(NamedTuple):
     """
 
     request: Request
+    series: WrfSeries
     coordinates: xr.Dataset
     albedo: xr.Dataset | None
     plumes: dict[str, PlumeSpecification]
@@ -186,9 +189,10 @@ def open_scene(request: Request) -> Scene:
     check_microphysics(request.microphysics)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
-    coordinates = wrf_coordinates(request.wrf, request.time or 0)
+    series = open_wrf_series(request.wrf)
+    times = series.find(request.time)
+    coordinates = series.coordinates(times[0])
     shape = coordinates.sizes["y"], coordinates.sizes["x"]
-    times = tuple(range(coordinates.sizes["time"])) if request.time is None else (request.time,)
     plumes = {}
     if request.plume is not None:
         brightness = read_plume(request.plume, shape)
@@ -201,7 +205,7 @@ def open_scene(request: Request) -> Scene:
         albedo = read_mcd43a1(request.albedo, solar, broadband=request.broadband)
     tops, present = [], set()
     for time in times:
-        place = wrf_coordinates(request.wrf, time)
+        place = series.coordinates(time)
         check_sight(place, request.satellite, request.satellite_longitude)
         check_ground(
             place,
@@ -212,7 +216,7 @@ def open_scene(request: Request) -> Scene:
             request.land_albedo,
         )
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
-            model = read_wrf(request.wrf, time, rows)
+            model = series.read(time, rows)
             check_land_albedo(request.land_albedo, model)
             if set(request.bands) & set(THERMAL):
                 check_emissivity(request.emissivity, model)
@@ -222,6 +226,7 @@ def open_scene(request: Request) -> Scene:
             present.update(classes_present(model, request.microphysics))
     return Scene(
         request,
+        series,
         coordinates,
         albedo,
         plumes,
@@ -267,7 +272,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
     )
 
     def read_block(time: int, rows: slice) -> xr.Dataset:
-        return specify(read_wrf(request.wrf, scene.chosen_times[time], rows), rows=rows)
+        return specify(scene.series.read(scene.chosen_times[time], rows), rows=rows)
 
     with ResultWriter(
         folder / RESULT,
@@ -283,7 +288,9 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
             num_streams=request.num_streams,
             block_columns=_BLOCK_COLUMNS,
         )
-        files = {"wrf": request.wrf, "albedo": request.albedo, "plume": request.plume}
+        wrf = dict.fromkeys(scene.series.places[time][0].name for time in scene.chosen_times)
+        account["wrf_file"] = "; ".join(wrf)
+        files = {"albedo": request.albedo, "plume": request.plume}
         account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from .._chunks import map_chunks
+from .._chunks import Listener, listening, map_chunks
 from ..atmosphere import Atmosphere, State
 from ..bands import BANDS, check_bands
 from ..files import InputError
@@ -38,6 +38,7 @@ def simulate(
     bands: Sequence[str] | None = None,
     gases: Sequence[str] | None = None,
     num_streams: int = 8,
+    listener: Listener | None = None,
 ) -> xr.Dataset:
     r"""Simulate the radiances and reflectances of a scenario.
 
@@ -55,6 +56,9 @@ def simulate(
         Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams
         Streams of the solver; see `solver.toa_brf`.
+    listener
+        Is told of columns as they are solved: all that can be in the bands without emission, then
+        all that can be in each of the others.
 
     Returns
     -------
@@ -78,17 +82,20 @@ def simulate(
     if gases and "vapour" not in scenario:
         raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
     states = column_states(scenario, bands)
-    fields = _optical_depths(states.atmosphere, bands)
+    with listening(None if listener is None else _Beforehand(listener)):
+        fields = _optical_depths(states.atmosphere, bands)
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
     flags = flags | _flags(states, fields["outside_fitted_range"])
     options = {"gases": gases, "num_streams": num_streams}
-    fields |= _reflectances(states, flags, bands, options)
+    with listening(listener):
+        fields |= _reflectances(states, flags, bands, options)
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
     distance = sun_distance(scenario["time"].values) if "time" in scenario.variables else 1.0
     light = [solar_irradiance(band, satellite) / (np.pi * distance**2) for band in bands]
     fields["radiance"] = fields["reflectance_factor"] * np.array(light)
     for band in set(bands) & set(THERMAL):
-        seen = _radiance(states, flags, band, satellite, distance, options)
+        with listening(listener):
+            seen = _radiance(states, flags, band, satellite, distance, options)
         fields["radiance"][:, bands.index(band)] = seen
         fields["brightness_temperature"] = np.asarray(
             brightness_temperature(jnp.asarray(seen), band, satellite)
@@ -110,6 +117,18 @@ def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:
     """Bits of ``quality_flag`` (column) of the states themselves, as `quality_flags` has them."""
     sun, view = states.geometry.solar_zenith, states.geometry.view_zenith
     return flags_from(np.asarray(sun), np.asarray(view), share_outside)
+
+
+class _Beforehand(NamedTuple):
+    """Hears for a listener of what is compiled, but not of columns, which are solved later."""
+
+    listener: Listener
+
+    def compiling(self, begins: bool) -> None:
+        self.listener.compiling(begins)
+
+    def solved(self, columns: int) -> None:
+        pass
 
 
 def _reflectances(

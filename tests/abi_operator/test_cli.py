@@ -163,6 +163,29 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         assert np.isfinite(result["radiance"]).all()
 
 
+def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
+    later = inputs.wrf.with_name("wrfout_d01_2007-10-23_20-00-00.nc")
+    shutil.copy(inputs.wrf, later)
+    with netCDF4.Dataset(later, "a") as file:
+        file["Times"][0] = np.array(list("2007-10-23_20:00:00"), "S1")
+    options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--gases", "none"]
+    options += ["--bands", "C01,C06", "--out", tmp_path / "out"]
+    for wrf in ([inputs.wrf, later], [inputs.wrf.with_name("wrfout_*")]):
+        outcome = invoke("simulate", *wrf, *options)
+        assert outcome.exit_code == 0, outcome.output
+        with read_result(tmp_path / "out" / "result.nc") as result:
+            hours = np.array(["2007-10-23T18", "2007-10-23T20"], "datetime64[ns]")
+            np.testing.assert_array_equal(result["time"], hours)
+            assert result.attrs["wrf_file"] == f"{inputs.wrf.name}; {later.name}"
+            early, late = result["solar_zenith_angle"].mean(["y", "x"]).values
+            assert late < early
+    outcome = invoke("simulate", *wrf, *options, "--time", "2007-10-23T20:00")
+    assert outcome.exit_code == 0, outcome.output
+    with read_result(tmp_path / "out" / "result.nc") as result:
+        np.testing.assert_array_equal(result["time"], hours[1:])
+        assert result.attrs["wrf_file"] == later.name
+
+
 def without(path, name):
     """Rename a variable of a file, so that it has no `name`."""
     with netCDF4.Dataset(path, "a") as file:
@@ -260,6 +283,7 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--bands", "all"], "C07 needs the emissivity of the ground"),
         (["--bands", "C04", "--satellite", "GOES-19"], "is not known of GOES-19"),
         (["--ocean-albedo", "0.1", "--time", "1"], "has 1 times; ask for one of them"),
+        (["--ocean-albedo", "0.1", "--time", "2005-08-28"], "has no time 2005-08-28; it has"),
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
         (["--satellite-longitude", "90"], "; give --satellite GOES-16 or GOES-17 or GOES-18"),
         (["--plume-species", "dust"], "'dust' is not one of"),

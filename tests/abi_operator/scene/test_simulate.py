@@ -1,5 +1,8 @@
 """Simulated scenes: what they contain, where they are undefined, and how they are cut."""
 
+import io
+import sys
+
 import numpy as np
 import pytest
 
@@ -189,6 +192,32 @@ def test_a_run_goes_through_all_times_and_rows(made):
         assert result["time"] == times[time_index]
         part = whole.isel(y=slice(start, start + 2))
         np.testing.assert_allclose(result["brf"], part["brf"], rtol=ROUNDING)
+
+
+def test_a_listener_hears_of_columns_as_they_are_solved(made):
+    class Listener:
+        columns = 0
+
+        def solved(self, columns):
+            self.columns += columns
+
+        def compiling(self, begins):
+            pass
+
+    listener = Listener()
+    night = made.assign(quality_flag=made["quality_flag"].copy())
+    night["quality_flag"][0] |= QUALITY_FLAGS["night"]
+    simulate(night, listener=listener, **OPTIONS)
+    assert listener.columns == 4
+
+
+def test_a_run_shows_how_far_it_is(made, monkeypatch):
+    terminal = io.StringIO()
+    monkeypatch.setattr(terminal, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    times, options = made["time"].values[None], {"block_columns": 4} | OPTIONS
+    run(lambda _, rows: made.isel(y=rows), times, (3, 2), lambda *_: None, **options)
+    assert " 0/6 " in terminal.getvalue() and " 6/6 " in terminal.getvalue()
 
 
 def test_blocks_of_rows_cover_a_scene():
