@@ -19,12 +19,16 @@ from typing import NamedTuple
 
 
 class Variable(NamedTuple):
-    """Dimensions, units (UDUNITS) and meaning of a Dataset variable; CF standard name if any."""
+    """Dimensions, units (UDUNITS) and meaning of a Dataset variable; CF standard name if any.
+
+    A text has no units, and ``positive`` says of a vertical coordinate where it grows.
+    """
 
     dims: tuple[str, ...]
     units: str
     long_name: str
     standard_name: str | None = None
+    positive: str | None = None
 
 
 HORIZONTAL = ("y", "x")
@@ -46,7 +50,7 @@ MODEL: dict[str, Variable] = {
     "surface_pressure": Variable(
         HORIZONTAL, "Pa", "pressure at the ground", "surface_air_pressure"
     ),
-    "height": Variable(("level", "y", "x"), "m", "height above sea level", "altitude"),
+    "height": Variable(("level", "y", "x"), "m", "height above sea level", "altitude", "up"),
     "layer_temperature": Variable(
         ("layer", "y", "x"), "K", "air temperature at mid-layer", "air_temperature"
     ),
@@ -79,6 +83,17 @@ MODEL: dict[str, Variable] = {
     ),
     "land_mask": Variable(HORIZONTAL, "1", "1 over land, 0 over water", "land_binary_mask"),
 }
+
+BY_BAND: dict[str, Variable] = {
+    "band": Variable(("band",), "", "band of the imager", "sensor_band_identifier"),
+    "band_wavelength": Variable(
+        ("band",),
+        "um",
+        "centroid of the band's response, GOES-16",
+        "sensor_band_central_radiation_wavelength",
+    ),
+}
+"""Coordinates along the bands."""
 
 SCENARIO: dict[str, Variable] = {
     "latitude": MODEL["latitude"],
@@ -175,7 +190,7 @@ GRAZING_ZENITH = 80.0
 
 def variable(name: str) -> Variable | None:
     """Look a Dataset variable up by name; None where the project does not define it."""
-    for table in (RESULT, SCENARIO, OPTIONAL, OPTIONAL_RESULT, MODEL):
+    for table in (RESULT, SCENARIO, OPTIONAL, OPTIONAL_RESULT, MODEL, BY_BAND):
         if name in table:
             return table[name]
     owner, _, quantity = name.partition("_")

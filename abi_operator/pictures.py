@@ -30,8 +30,8 @@ def write_png(path: str | PathLike[str], rgb: np.ndarray) -> None:
     """Write a picture as PNG, north at its top and small scenes enlarged.
 
     Every pixel becomes a square of whole pixels, so that a scene has 512 or more along its longer
-    side; the PNG's text ``Scale`` tells how large the squares are. Pixels with NaN are transparent, as
-    any grey would be that of clouds; a picture without any has no alpha channel.
+    side; the PNG's text ``Scale`` tells how large the squares are. Pixels with NaN are transparent,
+    as any grey would be that of clouds; a picture without any has no alpha channel.
 
     Parameters
     ----------

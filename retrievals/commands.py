@@ -18,11 +18,16 @@ SCORES = "scores.csv"
 
 
 def retrieve(
-    result: Annotated[Path, typer.Argument(help="Result of a simulation with smoke.")],
-    out: Annotated[Path, typer.Option(help="File for the retrieval.")],
-    bands: Annotated[str, typer.Option(help="Bands to use.")] = ",".join(BANDS),
+    result: Annotated[
+        Path, typer.Argument(help="result.nc of a simulation with a plume of smoke.")
+    ],
+    out: Annotated[Path, typer.Option(help="File to write, NetCDF.")],
+    bands: Annotated[str, typer.Option(help="Bands to retrieve from.")] = ",".join(BANDS),
     retrieve_ssa: Annotated[
-        bool, typer.Option(help="Retrieve single-scattering albedo, too.")
+        bool,
+        typer.Option(
+            help="Retrieve how much the smoke absorbs, too: its single-scattering albedo."
+        ),
     ] = False,
     noise: Annotated[bool, typer.Option(help="Add the imager's noise first.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,

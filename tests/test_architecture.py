@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = [
     {"cli"},
     {"guard", "simulation"},
-    {"commands", "demo", "scene"},
+    {"commands", "demo", "drawing", "scene"},
     {"files", "instrument", "pictures", "products"},
     {"quality", "radiance", "reflectance"},
     {"optics_and_solver", "state_checks"},

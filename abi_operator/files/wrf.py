@@ -18,6 +18,7 @@ from .netcdf import (
     require_dims,
     require_variables,
 )
+from .projection import projection_attributes
 
 VARIABLE_MAP = {
     "XLAT": "latitude",
@@ -119,7 +120,8 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
         [degree]; ``land_mask`` if the file has one. Attributes ``title``,
         ``microphysics_scheme`` (a name of `SCHEMES`, or ``"MP_PHYSICS=99"`` for a number that is
         not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
-        fewer) and ``moving_nest`` (1 where positions differ from time to time, else 0).
+        fewer), ``moving_nest`` (1 where positions differ from time to time, else 0) and those of
+        the map, as WRF names them (`projected`).
     """
     with open_netcdf(path) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
@@ -131,7 +133,9 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
                 "latitude": _field(file, "XLAT", **place),
                 "longitude": _field(file, "XLONG", **place),
             },
-            attrs=_attributes(file) | {"moving_nest": int(_moves(file))},
+            attrs=_attributes(file)
+            | {"moving_nest": int(_moves(file))}
+            | projection_attributes(file.attrs),
         )
         land_mask = _land_mask(file, **place)
         return dataset if land_mask is None else dataset.assign(land_mask=land_mask)
