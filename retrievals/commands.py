@@ -7,7 +7,7 @@ import typer
 import xarray as xr
 
 from abi_operator.bands import GRASSO2013, check_bands
-from abi_operator.commands import one_sentence
+from abi_operator.commands import one_sentence, typed
 from abi_operator.files import InputError, output_folder, read_result
 
 from .scoring import format_report, score_retrieval
@@ -18,6 +18,7 @@ SCORES = "scores.csv"
 
 
 def retrieve(
+    context: typer.Context,
     result: Annotated[
         Path, typer.Argument(help="result.nc of a simulation with a plume of smoke.")
     ],
@@ -41,6 +42,9 @@ def retrieve(
         retrieval = retrieve_smoke(
             dataset, bands=names, retrieve_ssa=retrieve_ssa, noise=noise, seed=seed
         )
+        # The latest event first, as `history` has it.
+        event = f"{retrieval.attrs['history']}: {typed(context)}"
+        retrieval.attrs["history"] = "\n".join([event, str(dataset.attrs["history"])])
         _write(retrieval, out)
     typer.echo(f"wrote {out}")
 

@@ -266,7 +266,7 @@ def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monk
         (["--ocean-albedo", "0.1", "--time", "1"], "has 1 times; ask for one of them"),
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
         (["--variables", "radiances"], "variables ['radiances'] are not those of a result"),
-        (["--satellite-longitude", "90"], "; give --satellite GOES-16 or GOES-17 or GOES-18"),
+        (["--satellite-longitude", "90"], "GOES-19 without --satellite-longitude, or"),
         (["--plume-species", "dust"], "'dust' is not one of"),
     ],
 )
