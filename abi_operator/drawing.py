@@ -1,5 +1,6 @@
 """Pictures of a simulated scene, one time after the other: colours, shades of grey and heat."""
 
+import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -62,6 +63,11 @@ class Painter:
         for name, picture in pictures.items():
             self.names.append(f"{name}_{stamp}.png")
             write_png(self._folder / self.names[-1], picture)
+            if np.isnan(picture).all():
+                warnings.warn(
+                    f"{self.names[-1]} is empty: nothing of it was simulated; the flags say why.",
+                    stacklevel=2,
+                )
 
 
 def draw(image: xr.Dataset, *, rayleigh_correction: bool = True) -> dict[str, np.ndarray]:

@@ -77,7 +77,7 @@ def stored(result: xr.Dataset, names: Sequence[str] = (ALL,)) -> xr.Dataset:
         if missing:
             raise InputError(
                 f"the result has no {', '.join(missing)}; choose of "
-                f"{', '.join(sorted(map(str, result.variables)))}."
+                f"{', '.join(sorted(map(str, result.data_vars)))}."
             )
         along_bands = {name: result[name] for name, a in result.coords.items() if "band" in a.dims}
         data = [name for name in dict.fromkeys([*names, _ALWAYS]) if name in result.data_vars]

@@ -155,6 +155,28 @@ def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
         assert (np.isnan(result["brf"].values).all(axis=1) == land).all()
 
 
+def test_blocks_of_rows_make_one_file_and_one_picture(invoke, tmp_path, inputs, monkeypatch):
+    options = ["--ocean-albedo", 0.03, "--bands", "C02", "--num-streams", 2, "--gases", "none"]
+    for name, block_columns in (("whole", 64), ("blocks", 24)):
+        monkeypatch.setattr(simulation, "_BLOCK_COLUMNS", block_columns)
+        outcome = invoke("simulate", inputs.wrf, *options, "--out", tmp_path / name)
+        assert outcome.exit_code == 0, outcome.output
+    picture = "C02_2007-10-23T180000.png"
+    assert len({(tmp_path / name / picture).read_bytes() for name in ("whole", "blocks")}) == 1
+    with read_result(tmp_path / "whole" / "result.nc") as whole:
+        with read_result(tmp_path / "blocks" / "result.nc") as blocks:
+            xr.testing.assert_equal(whole, blocks)
+
+
+def test_variables_that_the_scene_does_not_have_leave_nothing_behind(invoke, tmp_path, inputs):
+    options = ["--ocean-albedo", 0.03, "--bands", "C02", "--num-streams", 2, "--gases", "none"]
+    options += ["--variables", "brf,brightness_temperature", "--out", tmp_path / "out"]
+    outcome = invoke("simulate", inputs.wrf, *options)
+    assert outcome.exit_code == 2
+    assert "the result has no brightness_temperature; choose of brf, " in outcome.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
+
+
 def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
     """Of another satellite, with cloud ice in a corner and the emissivity of a surface type."""
     with netCDF4.Dataset(inputs.wrf, "a") as file:

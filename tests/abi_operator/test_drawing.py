@@ -85,3 +85,11 @@ def test_a_time_is_drawn_when_its_last_rows_have_come(tmp_path):
     first, second = (np.asarray(Image.open(tmp_path / name)) for name in painter.names)
     assert (first[:128, :, 3] == 0).all() and (first[128:, :, 3] == 255).all()
     assert (second[200] > first[200, :, :3]).all()
+
+
+def test_a_picture_of_nothing_is_warned_of(tmp_path):
+    painter = Painter(tmp_path, np.array(["2007-10-23T06:00"], "datetime64[ns]"), SHAPE[0])
+    image = scene(("C02",), 0.2)
+    image["brf"][:] = np.nan  # by night
+    with pytest.warns(UserWarning, match="C02_2007-10-23T060000.png is empty: nothing"):
+        painter.add(0, slice(0, 4), image)
