@@ -25,7 +25,7 @@ import typer
 from . import _ending, _kept
 from ._version import __version__
 from .bands import BANDS, GRASSO2013, check_bands
-from .commands import one_sentence
+from .commands import one_sentence, typed
 from .demo import write_demo
 from .files import output_folder
 from .guard.commands import jacobian
@@ -79,14 +79,18 @@ def _print(report: Report, out: Path, before: list[str]) -> None:
 
 
 def simulate(
+    context: typer.Context,
     wrf: Annotated[
         list[Path],
         typer.Argument(
             metavar="WRFOUT...",
-            help="Output of WRF: one file or more of one domain, any times, or patterns of names.",
+            help="Output of the WRF model (wrfout_*): one file or more of one domain, any times, "
+            "or patterns of names.",
         ),
     ],
-    out: Annotated[Path, typer.Option(help="Folder for the result and its pictures.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for result.nc and the pictures (PNG); made if need be.")
+    ],
     time: Annotated[
         str | None,
         typer.Option(
@@ -95,13 +99,24 @@ def simulate(
         ),
     ] = None,
     bands: Annotated[
-        str, typer.Option(help=f"Bands to simulate, of {', '.join(BANDS)}; all: C01 to C07.")
+        str,
+        typer.Option(
+            help=f"Bands to simulate, of {', '.join(BANDS)}; all: C01 to C07. "
+            "C01,C02,C03 make a picture in natural colours."
+        ),
     ] = ",".join(GRASSO2013),
     albedo: Annotated[
-        Path | None, typer.Option(help="MODIS albedo, MCD43A1 in NetCDF from AppEEARS.")
+        Path | None,
+        typer.Option(
+            help="How bright the land is: MODIS albedo MCD43A1, Band1, Band2, Band3, Band6 and "
+            "Band7, as a NetCDF file from AppEEARS."
+        ),
     ] = None,
     ocean_albedo: Annotated[
-        float | None, typer.Option(min=0, max=1, help="Albedo of water, in all bands but C07.")
+        float | None,
+        typer.Option(
+            min=0, max=1, help="How bright water is, in all bands but C07: 0.03 to 0.06 is usual."
+        ),
     ] = None,
     land_albedo: Annotated[
         str | None,
@@ -125,31 +140,42 @@ def simulate(
         ),
     ] = None,
     broadband: Annotated[
-        bool, typer.Option(help="Let broadband albedo stand in for missing spectral bands.")
+        bool,
+        typer.Option(
+            help="Where the albedo file lacks a band, take its broadband albedo for it, which is "
+            "less exact."
+        ),
     ] = False,
     emissivity: Annotated[
         str | None,
         typer.Option(
-            help="Of the ground in C07: a number, model (its own, broadband), land-use (that of "
-            "each column's land use), or one of "
+            help="Of the ground in C07, which C07 needs: a number, model (its own, broadband), "
+            "land-use (that of each column's land use), or one of "
             f"{', '.join(EMISSIVITY_3900NM)}."
         ),
     ] = None,
     plume: Annotated[
-        Path | None, typer.Option(help="Greyscale PNG, one pixel a column, north at the top.")
+        Path | None,
+        typer.Option(
+            help="Add a plume where this greyscale PNG is bright, one pixel a column, north at "
+            "the top."
+        ),
     ] = None,
     plume_species: Annotated[Species, typer.Option(help="What the plume is made of.")] = (
         Species.SMOKE
     ),
     plume_aod: Annotated[
-        float, typer.Option(min=0, help="Optical depth at 550 nm where the plume is white.")
+        float, typer.Option(min=0, help="Optical depth of the plume at 550 nm where it is white.")
     ] = 2.0,
     gases: Annotated[
         str, typer.Option(help=f"Gases that absorb: all, none, or some of {', '.join(ALL_GASES)}.")
     ] = _ALL,
     hydrometeors: Annotated[
         str,
-        typer.Option(help=f"Beside cloud water: all, none, or some of {', '.join(CLASSES)}."),
+        typer.Option(
+            help="Rain and ice to simulate beside cloud water: all that WRFOUT has, none, or some "
+            f"of {', '.join(CLASSES)}."
+        ),
     ] = _ALL,
     microphysics: Annotated[
         str | None,
@@ -166,14 +192,55 @@ def simulate(
             "its microphysics assumes, or else 100,300.",
         ),
     ] = None,
-    satellite: Annotated[str, typer.Option(help=f"One of {', '.join(SATELLITES)}.")] = "GOES-16",
+    satellite: Annotated[
+        str, typer.Option(help=f"Whose imager looks: {', '.join(SATELLITES)}.")
+    ] = "GOES-16",
     satellite_longitude: Annotated[
         float | None,
-        typer.Option(min=-180, max=360, help="In degrees, east positive, if not as usual."),
+        typer.Option(
+            min=-180,
+            max=360,
+            help="Where the satellite stands above the equator, in degrees, east positive, if not "
+            "at its usual place.",
+        ),
     ] = None,
-    num_streams: Annotated[int, typer.Option(min=2, help="Streams of the solver, even.")] = 8,
+    num_streams: Annotated[
+        int,
+        typer.Option(
+            min=2,
+            help="Directions by which scattered light is computed, even: more are more exact and "
+            "slower.",
+        ),
+    ] = 8,
+    variables: Annotated[
+        str,
+        typer.Option(
+            help="What result.nc keeps: all, which `abi-operator retrieve` needs; image, without "
+            "the air's layers, a fifth of the size or less; or names such as "
+            "reflectance_factor,radiance."
+        ),
+    ] = _ALL,
+    rayleigh_correction: Annotated[
+        bool,
+        typer.Option(
+            help="Take the blue haze of the air out of the picture in natural colours; result.nc "
+            "has it in any case."
+        ),
+    ] = True,
 ) -> None:
-    """Simulate what the imager would see of a scene in a weather model's output."""
+    """Simulate what the imager would see of a scene in a weather model's output.
+
+    Writes a folder with result.nc (reflectances and radiances of every band, and what they were
+    computed from) and a picture of every time. Columns over land need --albedo and those over water
+    --ocean-albedo.
+
+    \b
+    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --ocean-albedo 0.06 --out sea
+    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --albedo MCD43A1.nc \\
+        --ocean-albedo 0.03 --bands all --emissivity grassland --out coast
+
+    `abi-operator demo --size 16` makes files to try it with.
+    """
     if num_streams % 2:
         raise typer.BadParameter(f"the number of streams is even; got {num_streams}.")
     try:
@@ -203,6 +270,9 @@ def simulate(
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=num_streams,
+        variables=tuple(name.strip() for name in variables.split(",")),
+        rayleigh_correction=rayleigh_correction,
+        command=typed(context),
     )
     with one_sentence(), _user_warnings():
         scene = open_scene(request)
@@ -228,17 +298,25 @@ def _number(text: str | None) -> float | str | None:
 
 
 def demo(
+    context: typer.Context,
     size: Annotated[int, typer.Option(min=8, help="Rows and columns of the scene.")] = 64,
     out: Annotated[Path, typer.Option(help="Folder for inputs and results.")] = Path("abi-demo"),
     seed: Annotated[int, typer.Option(min=0, help="Another seed is another coast.")] = 0,
 ) -> None:
-    """Make up a smoky Californian coast, simulate it, retrieve the smoke and score the result."""
+    """Make up a smoky Californian coast and simulate it: a first run, which needs no files.
+
+    Writes model output, albedo and a plume's picture, as `abi-operator simulate` takes them, into
+    the folder inputs, and beside it result.nc and a picture of it in natural colours. Where the
+    retrievals are installed, which come with this package, the smoke is then retrieved from the
+    simulated image and compared with the smoke that was made up (retrieval.nc, scores.csv).
+    """
     with one_sentence(), _user_warnings():
         before = pictures_of_before(out)
         with output_folder(out, outdated=before) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
             # As in the paper, which neglects absorption by gases.
             request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume, gases=())
+            request = request._replace(command=typed(context))
             report = simulate_scene(open_scene(request), folder)
         _print(report, out, before)
     for entry in entry_points(group=COMMANDS, name="demo"):

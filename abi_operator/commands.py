@@ -1,7 +1,9 @@
 """What the commands of this package and of others that join its command line share."""
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import typer
 
@@ -16,3 +18,24 @@ def one_sentence() -> Iterator[None]:
     except InputError as error:
         typer.echo(f"abi-operator: {error}", err=True)
         raise typer.Exit(2) from None
+
+
+def typed(context: typer.Context) -> str:
+    """The command that is running, with those options that were given, for a file's history."""
+    words = ["abi-operator", context.info_name or ""]
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if source is None or source.name != "COMMANDLINE":
+            continue
+        value = context.params[parameter.name or ""]
+        if parameter.param_type_name == "argument":
+            words += _words(value)
+        elif isinstance(value, bool):
+            words.append((parameter.opts if value else parameter.secondary_opts)[0])
+        else:
+            words += [parameter.opts[0], *_words(value)]
+    return shlex.join(words)
+
+
+def _words(value: Any) -> list[str]:
+    return [str(one) for one in value] if isinstance(value, list | tuple) else [str(value)]

@@ -19,12 +19,16 @@ from typing import NamedTuple
 
 
 class Variable(NamedTuple):
-    """Dimensions, units (UDUNITS) and meaning of a Dataset variable; CF standard name if any."""
+    """Dimensions, units (UDUNITS) and meaning of a Dataset variable; CF standard name if any.
+
+    A text has no units, and ``positive`` says of a vertical coordinate where it grows.
+    """
 
     dims: tuple[str, ...]
     units: str
     long_name: str
     standard_name: str | None = None
+    positive: str | None = None
 
 
 HORIZONTAL = ("y", "x")
@@ -52,7 +56,7 @@ MODEL: dict[str, Variable] = {
     "surface_pressure": Variable(
         HORIZONTAL, "Pa", "pressure at the ground", "surface_air_pressure"
     ),
-    "height": Variable(("level", "y", "x"), "m", "height above sea level", "altitude"),
+    "height": Variable(("level", "y", "x"), "m", "height above sea level", "altitude", "up"),
     "layer_temperature": Variable(
         ("layer", "y", "x"), "K", "air temperature at mid-layer", "air_temperature"
     ),
@@ -94,6 +98,17 @@ MODEL: dict[str, Variable] = {
     "land_use": Variable(HORIZONTAL, "1", "number of the category of land use"),
     "snow_mass": Variable(HORIZONTAL, "kg m-2", "snow on the ground", "surface_snow_amount"),
 }
+
+BY_BAND: dict[str, Variable] = {
+    "band": Variable(("band",), "", "band of the imager", "sensor_band_identifier"),
+    "band_wavelength": Variable(
+        ("band",),
+        "um",
+        "centroid of the band's response, GOES-16",
+        "sensor_band_central_radiation_wavelength",
+    ),
+}
+"""Coordinates along the bands."""
 
 SCENARIO: dict[str, Variable] = {
     "latitude": MODEL["latitude"],
@@ -194,7 +209,7 @@ LARGEST_SHARE_OUTSIDE = 0.1
 
 def variable(name: str) -> Variable | None:
     """Look a Dataset variable up by name; None where the project does not define it."""
-    for table in (RESULT, SCENARIO, OPTIONAL, OPTIONAL_RESULT, MODEL):
+    for table in (RESULT, SCENARIO, OPTIONAL, OPTIONAL_RESULT, MODEL, BY_BAND):
         if name in table:
             return table[name]
     owner, _, quantity = name.partition("_")

@@ -4,7 +4,6 @@ This is where readers and scenes meet: `open_scene` opens and checks everything,
 writes the result and pictures of every time.
 """
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
@@ -15,20 +14,24 @@ import numpy as np
 import xarray as xr
 
 from .bands import GRASSO2013
+from .drawing import Painter
 from .files import (
     ResultWriter,
     WrfSeries,
+    check_variables,
     note_files,
     noted_files,
     open_wrf_series,
+    projected,
     read_mcd43a1,
     read_plume,
     read_result,
+    rounded,
+    stored,
 )
+from .files.stored import ALL
 from .nomenclature import QUALITY_FLAGS
 from .optics import ALL_GASES, ash, smoke
-from .pictures import grey, write_png
-from .products import natural_color
 from .radiance import THERMAL
 from .scene import (
     CLASSES,
@@ -72,8 +75,6 @@ _COVERS = {
     "snow_count": "snow on the ground",
 }
 
-# Brightness temperatures that are black and white in a picture. [K]
-_GREYS = (320.0, 220.0)
 # Atmospheric columns in memory at a time.
 _BLOCK_COLUMNS = 16384
 
@@ -114,6 +115,12 @@ class Request(NamedTuple):
         Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
     num_streams
         Streams of the solver.
+    variables
+        What the result keeps, as `files.stored` takes it.
+    rayleigh_correction
+        Whether the air is taken out of pictures in natural colours.
+    command
+        What was typed, for the result's history.
     """
 
     wrf: Path | Sequence[Path]
@@ -136,6 +143,9 @@ class Request(NamedTuple):
     land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None
     snow_albedo: IceAlbedo | None = None
+    variables: tuple[str, ...] = (ALL,)
+    rayleigh_correction: bool = True
+    command: str | None = None
 
 
 class Scene(NamedTuple):
@@ -189,6 +199,7 @@ def open_scene(request: Request) -> Scene:
     check_microphysics(request.microphysics)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
+    check_variables(request.variables)
     series = open_wrf_series(request.wrf)
     times = series.find(request.time)
     coordinates = series.coordinates(times[0])
@@ -272,19 +283,30 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
     )
 
     def read_block(time: int, rows: slice) -> xr.Dataset:
-        return specify(scene.series.read(scene.chosen_times[time], rows), rows=rows)
+        return rounded(specify(scene.series.read(scene.chosen_times[time], rows), rows=rows))
 
+    moving = bool(scene.coordinates.attrs["moving_nest"]) and len(scene.times) > 1
+    painter = Painter(
+        folder, scene.times, scene.shape[0], rayleigh_correction=request.rayleigh_correction
+    )
     with ResultWriter(
         folder / RESULT,
         times=scene.times,
         shape=scene.shape,
-        moving=bool(scene.coordinates.attrs["moving_nest"]),
+        moving=moving,
+        grid=None if moving else projected(scene.coordinates),
+        command=request.command,
     ) as writer:
+
+        def write_block(time: int, rows: slice, result: xr.Dataset) -> None:
+            writer.write(time, rows, stored(result, request.variables))
+            painter.add(time, rows, result)
+
         account = run(
             read_block,
             scene.times,
             scene.shape,
-            writer.write,
+            write_block,
             num_streams=request.num_streams,
             block_columns=_BLOCK_COLUMNS,
         )
@@ -294,38 +316,14 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:
-        pictures = _draw(result, folder)
-        report = Report([RESULT, *pictures], [*_flag_lines(result), *_account_lines(account)])
-    note_files(folder / RESULT, pictures)
-    return report
+        lines = [*_flag_lines(result), *_plume_lines(scene), *_account_lines(account)]
+    note_files(folder / RESULT, painter.names)
+    return Report([RESULT, *painter.names], lines)
 
 
 def pictures_of_before(folder: Path) -> list[str]:
     """Names of the pictures of the result that is in a folder, which another will replace."""
     return noted_files(folder / RESULT)
-
-
-def _draw(result: xr.Dataset, folder: Path) -> list[str]:
-    """Draw every time in natural colours and in C07, where the bands for it were simulated."""
-    colours = ("C01", "C02", "C03")
-    coloured = set(colours) <= set(result["band"].values.tolist())
-    warm = "brightness_temperature" in result
-    if not (coloured or warm):
-        warnings.warn(
-            f"no pictures were drawn: they need {', '.join(colours)}, or C07.", stacklevel=2
-        )
-    names = []
-    for time in result["time"].values:
-        image = result.sel(time=time)
-        stamp = np.datetime_as_string(time, unit="s").replace(":", "")
-        if coloured:
-            brf = {band: image["brf"].sel(band=band).values for band in colours}
-            names.append(f"natural_color_{stamp}.png")
-            write_png(folder / names[-1], np.asarray(natural_color(brf)))
-        if warm:
-            names.append(f"C07_{stamp}.png")
-            write_png(folder / names[-1], grey(image["brightness_temperature"].values, *_GREYS))
-    return names
 
 
 def _flag_lines(result: xr.Dataset) -> Iterator[str]:
@@ -334,6 +332,17 @@ def _flag_lines(result: xr.Dataset) -> Iterator[str]:
     counts = {name: np.count_nonzero(flags & bit) for name, bit in QUALITY_FLAGS.items()}
     flagged = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
     yield f"{flags.size} pixels; flagged: {flagged or 'none'}"
+
+
+def _plume_lines(scene: Scene) -> Iterator[str]:
+    """Where the plumes are, and how thick."""
+    for species, (plume, brightness) in scene.plumes.items():
+        largest = float(plume.aod_550) * float(brightness.max())
+        base, top = (float(height) / 1000 for height in (plume.base, plume.top))
+        yield (
+            f"plume of {species}: {np.count_nonzero(brightness)} of {brightness.size} columns, "
+            f"optical depth at 550 nm up to {largest:.2g}, {base:g} to {top:g} km above the ground"
+        )
 
 
 def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:

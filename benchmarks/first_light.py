@@ -22,7 +22,14 @@ import numpy as np
 
 from abi_operator import BANDS, GRASSO2013, __version__, brf, smoke
 from abi_operator.demo import write_demo
-from abi_operator.files import ResultWriter, read_mcd43a1, read_plume, read_wrf, wrf_coordinates
+from abi_operator.files import (
+    ResultWriter,
+    read_mcd43a1,
+    read_plume,
+    read_wrf,
+    stored,
+    wrf_coordinates,
+)
 from abi_operator.optics import column_optics
 from abi_operator.pictures import write_png
 from abi_operator.products import natural_color
@@ -84,7 +91,7 @@ def write(result, folder):
     shape = result.sizes["y"], result.sizes["x"]
     times = np.atleast_1d(result["time"].values)
     with ResultWriter(folder / "result.nc", times=times, shape=shape) as writer:
-        writer.write(0, slice(None), result)
+        writer.write(0, slice(None), stored(result))
     by_band = {str(b): result["brf"].sel(band=b).values for b in result["band"].values}
     write_png(folder / "picture.png", natural_color(by_band))
 

@@ -7,7 +7,7 @@ import typer
 import xarray as xr
 
 from abi_operator.bands import GRASSO2013, check_bands
-from abi_operator.commands import one_sentence
+from abi_operator.commands import one_sentence, typed
 from abi_operator.files import InputError, output_folder, read_result
 
 from .scoring import format_report, score_retrieval
@@ -18,11 +18,17 @@ SCORES = "scores.csv"
 
 
 def retrieve(
-    result: Annotated[Path, typer.Argument(help="Result of a simulation with smoke.")],
-    out: Annotated[Path, typer.Option(help="File for the retrieval.")],
-    bands: Annotated[str, typer.Option(help="Bands to use.")] = ",".join(BANDS),
+    context: typer.Context,
+    result: Annotated[
+        Path, typer.Argument(help="result.nc of a simulation with a plume of smoke.")
+    ],
+    out: Annotated[Path, typer.Option(help="File to write, NetCDF.")],
+    bands: Annotated[str, typer.Option(help="Bands to retrieve from.")] = ",".join(BANDS),
     retrieve_ssa: Annotated[
-        bool, typer.Option(help="Retrieve single-scattering albedo, too.")
+        bool,
+        typer.Option(
+            help="Retrieve how much the smoke absorbs, too: its single-scattering albedo."
+        ),
     ] = False,
     noise: Annotated[bool, typer.Option(help="Add the imager's noise first.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
@@ -36,6 +42,9 @@ def retrieve(
         retrieval = retrieve_smoke(
             dataset, bands=names, retrieve_ssa=retrieve_ssa, noise=noise, seed=seed
         )
+        # The latest event first, as `history` has it.
+        event = f"{retrieval.attrs['history']}: {typed(context)}"
+        retrieval.attrs["history"] = "\n".join([event, str(dataset.attrs["history"])])
         _write(retrieval, out)
     typer.echo(f"wrote {out}")
 

@@ -125,7 +125,8 @@ def _check(dataset: xr.Dataset, bands: tuple[str, ...], vector: StateVector) -> 
     missing = [name for name in _REQUIRED if name not in dataset.variables]
     if missing:
         raise InputError(
-            f"the result has no {', '.join(missing)}; simulate a scene with a plume of smoke."
+            f"the result has no {', '.join(missing)}; simulate a scene with a plume of smoke, and "
+            "keep all of it (abi-operator simulate with --plume, and without --variables)."
         )
     lacking = sorted(set(bands) - set(dataset["band"].values.tolist()))
     if lacking:

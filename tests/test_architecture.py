@@ -11,7 +11,7 @@ FLOORS = [
     {"__main__"},
     {"cli"},
     {"guard", "simulation"},
-    {"commands", "demo", "scene"},
+    {"commands", "demo", "drawing", "scene"},
     {"files", "instrument", "pictures", "products"},
     {"quality", "radiance", "reflectance"},
     {"optics_and_solver", "state_checks"},

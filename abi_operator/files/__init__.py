@@ -13,10 +13,14 @@ from .errors import InputError as InputError
 from .mcd43 import read_mcd43a1 as read_mcd43a1
 from .mcd43 import read_white_sky as read_white_sky
 from .plume import read_plume as read_plume
+from .projection import projected as projected
 from .result import ResultWriter as ResultWriter
 from .result import note_files as note_files
 from .result import noted_files as noted_files
 from .result import read_result as read_result
+from .stored import check_variables as check_variables
+from .stored import rounded as rounded
+from .stored import stored as stored
 from .wrf import read_wrf as read_wrf
 from .wrf import wrf_coordinates as wrf_coordinates
 from .wrf_series import WrfSeries as WrfSeries

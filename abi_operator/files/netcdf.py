@@ -94,11 +94,15 @@ def load_finite(array: xr.DataArray, path: FilePath) -> np.ndarray:
 
 
 def cf_attributes(name: str) -> dict[str, str]:
-    """Attributes ``units``, ``long_name`` and ``standard_name`` of one of our variables."""
+    """CF attributes of one of our variables: units, names, and what belongs to some of them."""
     entry = variable(name)
     if entry is None:
         return {}
-    attributes = {"units": entry.units, "long_name": entry.long_name}
-    if entry.standard_name is not None:
-        attributes["standard_name"] = entry.standard_name
-    return attributes
+    attributes = {
+        "units": entry.units or None,
+        "long_name": entry.long_name,
+        "standard_name": entry.standard_name,
+        "positive": entry.positive,
+        "units_metadata": "temperature: on_scale" if entry.units == "K" else None,
+    }
+    return {key: value for key, value in attributes.items() if value is not None}

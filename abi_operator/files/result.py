@@ -1,6 +1,6 @@
 """The result of a scene as a CF NetCDF file, written and read block by block of rows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from .._version import __version__
-from ..nomenclature import HORIZONTAL, QUALITY_FLAGS, SCENARIO, variable
+from ..nomenclature import BY_BAND, HORIZONTAL, QUALITY_FLAGS, SCENARIO, variable
 from .errors import InputError
 from .netcdf import cf_attributes, open_netcdf, require_dims, require_variables
 
@@ -24,7 +24,7 @@ _TIME_UNITS = "seconds since 1970-01-01 00:00:00"
 _CALENDAR = "standard"
 _POSITION = ("latitude", "longitude")
 _ADVICE = "give a result that a simulation wrote"
-_REQUIRED = ("reflectance_factor", *SCENARIO)
+_REQUIRED = (*_POSITION, "quality_flag")
 
 
 class ResultWriter:
@@ -50,6 +50,10 @@ class ResultWriter:
     attributes
         Global attributes besides ``Conventions``, ``source`` and ``history``; ``title`` has a
         default.
+    grid
+        Coordinates ``x``, ``y`` and ``crs`` of `projected`; None where there is no such map.
+    command
+        The command that is run, for ``history``.
     """
 
     def __init__(
@@ -60,7 +64,10 @@ class ResultWriter:
         shape: tuple[int, int],
         moving: bool = False,
         attributes: Mapping[str, str | int | float] | None = None,
+        grid: xr.Dataset | None = None,
+        command: str | None = None,
     ) -> None:
+        self._grid = grid
         self._path = Path(path).absolute()
         self._times = np.atleast_1d(np.asarray(times)).astype("datetime64[ns]")
         self._shape = shape
@@ -74,13 +81,15 @@ class ResultWriter:
                 f"{path} cannot be written ({error.strerror}); give a path in a folder that can."
             ) from error
         now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        source = f"abi_operator {__version__}"
+        event = f"written by {source}" if command is None else f"{command} ({source})"
         self._file.setncatts(
             {"title": "Synthetic imagery of the GOES-R Advanced Baseline Imager"}
             | dict(attributes or {})
             | {
                 "Conventions": CONVENTIONS,
-                "source": f"{_SOURCE}{__version__}",
-                "history": f"{now} written by abi_operator {__version__}",
+                "source": source,
+                "history": f"{now} {event}",
             }
         )
 
@@ -174,10 +183,15 @@ class ResultWriter:
         time.setncatts(
             {"standard_name": "time", "long_name": "time", "axis": "T"}
             | {"units": _TIME_UNITS, "calendar": _CALENDAR}
+            | {"units_metadata": "leap_seconds: none"}
         )
         time[:] = self._times.astype(np.int64) / 1e9
+        for name, array in {} if self._grid is None else self._grid.coords.items():
+            created = self._file.createVariable(str(name), array.dtype, array.dims)
+            created.setncatts(array.attrs)
+            created[...] = array.values
+        self._variables = {str(name): _dims(array) for name, array in dataset.variables.items()}
         for name, array in dataset.variables.items():
-            self._variables[str(name)] = _dims(array)
             self._define_variable(str(name), array, dataset.sizes["y"])
 
     def _define_variable(self, name: str, array: xr.Variable, num_rows: int) -> None:
@@ -200,7 +214,22 @@ class ResultWriter:
             fill_value=np.nan if kind.kind == "f" and horizontal else False,
         )
         created.set_auto_mask(False)
-        created.setncatts(_attributes(name, array, horizontal))
+        created.setncatts(_attributes(name, array))
+        if horizontal and name not in _POSITION and self._grid is not None:
+            created.grid_mapping = "crs"
+        if coordinates := " ".join(self._coordinates_of(name, array)):
+            created.coordinates = coordinates
+
+    def _coordinates_of(self, name: str, array: xr.Variable) -> Iterator[str]:
+        """Coordinates of a variable beside those of the same names as its dimensions."""
+        if name in (*_POSITION, *BY_BAND):
+            return
+        if "band" in array.dims and "band_wavelength" in self._variables:
+            yield "band_wavelength"
+        if "level" in array.dims and name != "height" and "height" in self._variables:
+            yield "height"
+        if "y" in array.dims:
+            yield from _POSITION
 
 
 def read_result(path: str | PathLike[str]) -> xr.Dataset:
@@ -214,13 +243,14 @@ def read_result(path: str | PathLike[str]) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Dimensions ``time band level layer y x``; latitude and longitude are coordinates. It
-        keeps the file open: close it, or use it as a context manager.
+        Dimensions ``time band level layer y x``; latitude and longitude are coordinates, and so are
+        x and y where the file has them. It keeps the file open: close it, or use it as a context
+        manager.
     """
     dataset = open_netcdf(path)
     try:
         require_variables(dataset, ("time", "band", *_REQUIRED), path, _ADVICE)
-        for name in _REQUIRED:
+        for name in (name for name in ("reflectance_factor", *SCENARIO) if name in dataset):
             entry = variable(name)
             assert entry is not None
             timed = "time" in dataset[name].dims or name not in _POSITION
@@ -233,7 +263,8 @@ def read_result(path: str | PathLike[str]) -> xr.Dataset:
     microseconds = np.rint(1e6 * dataset["time"].values).astype("datetime64[us]")
     for array in dataset.variables.values():
         array.attrs.pop("coordinates", None)
-    result = dataset.set_coords(_POSITION).assign_coords(
+    others = [name for name in ("band_wavelength", "crs") if name in dataset.variables]
+    return dataset.set_coords([*_POSITION, *others]).assign_coords(
         time=("time", microseconds.astype("datetime64[ns]"), {"standard_name": "time"}),
         band=("band", dataset["band"].values.astype(str), dataset["band"].attrs),
     )
@@ -264,12 +295,10 @@ def noted_files(path: str | PathLike[str]) -> list[str]:
     return [name for name in names if Path(name).name == name and (folder / name).is_file()]
 
 
-def _attributes(name: str, array: xr.Variable, horizontal: bool) -> dict[str, object]:
-    """Attributes of a variable: the project's, the block's own, and what ties them together."""
+def _attributes(name: str, array: xr.Variable) -> dict[str, object]:
+    """Attributes of a variable: the project's, the block's own, and those of flags."""
     attributes: dict[str, object] = {**cf_attributes(name)}
     attributes |= {str(k): v for k, v in array.attrs.items() if k != "_FillValue"}
-    if horizontal and name not in _POSITION:
-        attributes["coordinates"] = " ".join(_POSITION)
     if name in ("reflectance_factor", "brf", "radiance", "brightness_temperature"):
         attributes["ancillary_variables"] = "quality_flag"
     if name == "quality_flag":

@@ -21,6 +21,7 @@ from .netcdf import (
     require_variables,
 )
 from .plausible import plausible, without_traces
+from .projection import projection_attributes
 from .wrf_values import DIMENSIONS, SUMS, check_block, check_stated_units
 
 VARIABLE_MAP = {
@@ -128,7 +129,8 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
         [degree]; ``land_mask`` and ``sea_ice`` if the file has them. Attributes ``title``,
         ``microphysics_scheme`` (a name of `SCHEMES`, or ``"MP_PHYSICS=99"`` for a number that is
         not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
-        fewer) and ``moving_nest`` (1 where positions differ from time to time, else 0).
+        fewer), ``moving_nest`` (1 where positions differ from time to time, else 0) and those of
+        the map, as WRF names them (`projected`).
     """
     with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
@@ -140,7 +142,9 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
                 "latitude": _field(file, "XLAT", **place),
                 "longitude": _field(file, "XLONG", **place),
             },
-            attrs=_attributes(file) | {"moving_nest": int(_moves(file))},
+            attrs=_attributes(file)
+            | {"moving_nest": int(_moves(file))}
+            | projection_attributes(file.attrs),
         )
         land_mask = _land_mask(file, **place)
         if land_mask is not None:

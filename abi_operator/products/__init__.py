@@ -25,4 +25,5 @@ from .nir_test import green_change as green_change
 from .nir_test import nir_test as nir_test
 from .rayleigh_correction import air_response as air_response
 from .rayleigh_correction import rayleigh_corrected as rayleigh_corrected
+from .rayleigh_table import LOWEST_COSINE as LOWEST_COSINE
 from .rayleigh_table import rayleigh_air as rayleigh_air

@@ -25,7 +25,10 @@ from .rayleigh_doubling import air_layer
 # scattered twice by less than 1e-5. [-]
 STANDARD_BETA2 = 0.4793
 
-_LOWEST_COSINE = 0.1  # 84.3 degrees: beyond, the Earth's curvature spoils plane-parallel air
+LOWEST_COSINE = 0.1
+"""Cosine of the largest zenith angle of `rayleigh_air`, 84.3 degrees: beyond, the Earth's curvature
+spoils plane-parallel air. [-]"""
+
 _THINNEST, _THICKEST = 1e-3, 0.4  # optical depths between which F_m follows ln(tau)
 _COSINE_CELLS, _DEPTH_CELLS = 12, 8
 
@@ -71,7 +74,7 @@ def rayleigh_air(
     xp, (tau, mu0, mu, relative_azimuth) = floats(tau, mu0, mu, relative_azimuth)
     inside = (tau >= 0) & (tau <= _THICKEST)
     for cosine in (mu0, mu):
-        inside = inside & (cosine >= _LOWEST_COSINE) & (cosine <= 1)
+        inside = inside & (cosine >= LOWEST_COSINE) & (cosine <= 1)
     tau, mu0, mu = (xp.where(inside, x, safe) for x, safe in ((tau, 0.1), (mu0, 0.5), (mu, 0.5)))
     tables, dtype = _tables(), mu.dtype
     depth = _cell(xp, _depth_position(xp, tau), _DEPTH_CELLS)
@@ -111,7 +114,7 @@ def _phase_modes(mu0: Any, mu: Any, sines: Any, beta2: Any) -> tuple[Any, Any, A
 
 
 def _cosine_position(cosine: Any) -> Any:
-    return (cosine - _LOWEST_COSINE) * (_COSINE_CELLS / (1 - _LOWEST_COSINE))
+    return (cosine - LOWEST_COSINE) * (_COSINE_CELLS / (1 - LOWEST_COSINE))
 
 
 def _depth_position(xp: Any, tau: Any) -> Any:
@@ -170,7 +173,7 @@ def _beside(coefficients: np.ndarray) -> np.ndarray:
 def _tables() -> _Tables:
     """Solve the layers of the tables and fit the splines."""
     cosines, depths = _sites(_COSINE_CELLS), _sites(_DEPTH_CELLS)
-    cosines = _LOWEST_COSINE + (1 - _LOWEST_COSINE) * cosines / _COSINE_CELLS
+    cosines = LOWEST_COSINE + (1 - LOWEST_COSINE) * cosines / _COSINE_CELLS
     depths = _THINNEST * (_THICKEST / _THINNEST) ** (depths / _DEPTH_CELLS)
     layer = air_layer(depths, cosines, STANDARD_BETA2)
     tau, mu0, mu = depths[:, None, None], cosines[:, None], cosines

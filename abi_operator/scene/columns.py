@@ -99,7 +99,9 @@ class _Reader:
             array = array.sel(band=band)
         missing = {d: n for d, n in self._horizontal.items() if d not in array.dims}
         array = array.expand_dims(missing).transpose(*self._horizontal, *dims)
-        return array.values.reshape(-1, *array.shape[len(self._horizontal) :])
+        # Files keep most variables in single precision; what is computed of them is not.
+        values = np.asarray(array.values, np.float64)
+        return values.reshape(-1, *array.shape[len(self._horizontal) :])
 
     def optional(self, name: str, *dims: str) -> Any:
         """As `values`, or None where there is no such variable."""

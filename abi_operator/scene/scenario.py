@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from ..bands import GRASSO2013, check_bands
+from ..bands import BANDS, GRASSO2013, check_bands
 from ..files import InputError
 from ..files.netcdf import cf_attributes
 from ..nomenclature import QUALITY_FLAGS, variable
@@ -111,7 +111,8 @@ def scenario(
     -------
     xarray.Dataset
         Variables of `nomenclature.SCENARIO` and of the plumes and, where they are simulated, of
-        `nomenclature.OPTIONAL` and of the hydrometeors; coordinates ``band`` and ``time``.
+        `nomenclature.OPTIONAL` and of the hydrometeors; coordinates ``band``,
+        ``band_wavelength`` and ``time``.
         Attributes account for what was assumed, completed and left out (`add_accounts`).
 
     Raises
@@ -162,10 +163,15 @@ def scenario(
         "quality_flag": angle_flags(angles) | no_albedo,
     }
     fields |= air_fields | _paths(condensate, len(added_heights))
+    wavelengths = [BANDS[band].wavelength_um for band in bands]
     dataset = xr.Dataset(
         {name: (_dims(name), field, cf_attributes(name)) for name, field in fields.items()},
         coords={name: (_dims(name), x, cf_attributes(name)) for name, x in position.items()}
-        | {"band": list(bands), "time": time},
+        | {
+            "band": ("band", list(bands), cf_attributes("band")),
+            "band_wavelength": ("band", wavelengths, cf_attributes("band_wavelength")),
+            "time": time,
+        },
     )
     for species, specification in (plumes or {}).items():
         dataset = dataset.assign(plume_variables(species, specification, bands, rows))

@@ -30,11 +30,12 @@ def check_sight(
     zenith = _zenith(place, longitude)
     if (zenith < 90).any():
         return
-    others = [
+    others = " or ".join(
         name for name, there in SATELLITE_LONGITUDE.items() if (_zenith(place, there) < 90).all()
-    ]
+    )
+    alone = "" if satellite_longitude is None else " without --satellite-longitude"
     best = _middle(place["longitude"].values)
-    advice = [f"--satellite {' or '.join(others)}"] if others else []
+    advice = [f"--satellite {others}{alone}"] if others else []
     if (_zenith(place, best) < 90).any():
         advice.append(f"--satellite-longitude {best:.0f}")
     found = (

@@ -13,6 +13,7 @@ AOD_EDGES = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, np.inf)
 ALBEDO_EDGES = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 1.0)
 """Bins of surface albedo in C02, or in the first band where that was not used. [-]"""
 
+_TRUTH = ("smoke_aod_550", "surface_albedo")
 _HEADS = ("", "N", "bias", "rmse", "max", "r", "slope", "inside EE")
 
 
@@ -32,6 +33,12 @@ def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:
         refused for another reason than the plume mask. Mean square and coverage of standardised
         errors are attributes.
     """
+    missing = [name for name in _TRUTH if name not in result.variables]
+    if missing:
+        raise InputError(
+            f"the result has no {', '.join(missing)}; give the one that the retrieval was made of, "
+            "with all of its variables."
+        )
     codes = retrieval["result_code"].values
     truth_image = result["smoke_aod_550"].values
     if truth_image.shape != codes.shape:
@@ -40,9 +47,9 @@ def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:
             "give the retrieval of this result."
         )
     success = codes == ResultCode.SUCCESS
-    missing = np.full(codes.shape, np.nan)  # where no pixel was attempted
+    nothing = np.full(codes.shape, np.nan)  # where no pixel was attempted
     retrieved, sigma = (
-        (retrieval[name].values if name in retrieval else missing)[success]
+        (retrieval[name].values if name in retrieval else nothing)[success]
         for name in ("aod_550", "aod_550_sigma")
     )
     truth = truth_image[success]

@@ -12,6 +12,8 @@ import jax.numpy as jnp
 import netCDF4
 import numpy as np
 import pytest
+import xarray as xr
+from conventions import complaints
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -62,10 +64,16 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
     assert f"computed on {usable_cores()} core" in outcome.output
     with read_result(out / "result.nc") as result:
         assert result.sizes["time"] == 1 and result.sizes["band"] == 4
-        assert result["brf"].dtype == np.float64 and np.isfinite(result["brf"]).all()
+        assert result["brf"].dtype == np.float32 and np.isfinite(result["brf"]).all()
+        assert result["reflectance_factor"].dtype == np.float64
+        assert f"abi-operator demo --size {SIZE} --out {out} (abi_operator" in result.history
+        np.testing.assert_allclose(np.diff(result["x"]), 32e3, rtol=1e-4)
         assert result["smoke_aod_550"].max() <= 2.0
         assert result.attrs["wrf_file"].startswith("wrfout_")
         assert "US Standard Atmosphere 1976" in result.attrs["air_above_model"]
+    assert "plume of smoke: 16 of 64 columns, optical depth at 550 nm up to 2, 1 to 3 km" in (
+        outcome.output
+    )
     with Image.open(out / picture) as image:
         assert image.size == (512, 512)
 
@@ -95,8 +103,45 @@ def test_a_result_is_all_that_the_operator_needs(invoke, tmp_path):
     with read_result(tmp_path / "result.nc") as result:
         stored = result.isel(time=0).load()
     again = scene.simulate(stored)
-    for name in ("brf", "reflectance_factor", "smoke_optical_depth"):
+    for name in ("reflectance_factor", "smoke_aod_550"):
         np.testing.assert_array_equal(again[name], stored[name])
+    for name in ("brf", "smoke_optical_depth"):  # which the file has in single precision
+        np.testing.assert_array_equal(again[name].astype(np.float32), stored[name])
+
+
+def test_a_result_follows_the_conventions(invoke, tmp_path):
+    invoke("demo", "--size", SIZE, "--out", tmp_path)
+    assert complaints(tmp_path / "result.nc") == []
+    with xr.open_dataset(tmp_path / "result.nc") as plain:  # as a user of xarray has it
+        brf = plain["brf"].sel(band="C02")
+        assert set(brf.coords) == {
+            *("time", "band", "band_wavelength", "latitude", "longitude", "x", "y")
+        }
+        assert plain["crs"].attrs["grid_mapping_name"] == "mercator"
+
+
+@pytest.mark.parametrize("correction", [True, False])
+def test_images_and_names_are_smaller(invoke, tmp_path, inputs, correction):
+    """And pictures need none of what is left out."""
+    sizes = {}
+    for variables in ("all", "image", "radiance,smoke_aod_550"):
+        out = tmp_path / variables
+        options = ["--albedo", inputs.albedo, "--ocean-albedo", 0.03, "--plume", inputs.plume]
+        options += ["--gases", "none", "--variables", variables, "--out", out]
+        options += [] if correction else ["--no-rayleigh-correction"]
+        outcome = invoke("simulate", inputs.wrf, *options)
+        assert outcome.exit_code == 0, outcome.output
+        (picture,) = out.glob("*.png")
+        sizes[variables] = (out / "result.nc").stat().st_size
+        with read_result(out / "result.nc") as result:
+            assert ("pressure" in result) == (variables == "all")
+            assert result["radiance"].dtype == np.float32
+            assert ("--no-rayleigh-correction" in result.history) != correction
+            assert f"--variables {variables}" in result.history
+        with Image.open(picture) as image:
+            blue = np.asarray(image)[..., 2].mean()
+            assert (blue > 110) != correction
+    assert sizes["radiance,smoke_aod_550"] < sizes["image"] < sizes["all"]
 
 
 def test_simulate_does_what_demo_does(invoke, tmp_path, inputs):
@@ -116,7 +161,11 @@ def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
     out = tmp_path / "out"
     outcome = invoke("simulate", inputs.wrf, "--ocean-albedo", 0.03, *options, "--out", out)
     assert outcome.exit_code == 0, outcome.output
-    assert "warning: no pictures were drawn: they need C01, C02, C03, or C07." in outcome.output
+    pictures = ["C01_2007-10-23T180000.png", "C06_2007-10-23T180000.png"]
+    assert sorted(path.name for path in out.iterdir()) == [*pictures, "result.nc"]
+    assert "plume of ash: 16 of 64 columns, optical depth at 550 nm up to 0.5, " in outcome.output
+    with Image.open(out / pictures[0]) as image:  # land has no albedo here, and is transparent
+        assert 0 < (np.asarray(image)[..., 3] == 0).mean() < 1
     assert "flagged: no_albedo" in outcome.output
     with read_result(out / "result.nc") as result:
         assert result["band"].values.tolist() == ["C01", "C06"]
@@ -124,6 +173,28 @@ def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
         assert result.attrs["satellite_longitude"] == -137.0
         land = (result["quality_flag"].values & QUALITY_FLAGS["no_albedo"]) > 0
         assert (np.isnan(result["brf"].values).all(axis=1) == land).all()
+
+
+def test_blocks_of_rows_make_one_file_and_one_picture(invoke, tmp_path, inputs, monkeypatch):
+    options = ["--ocean-albedo", 0.03, "--bands", "C02", "--num-streams", 2, "--gases", "none"]
+    for name, block_columns in (("whole", 64), ("blocks", 24)):
+        monkeypatch.setattr(simulation, "_BLOCK_COLUMNS", block_columns)
+        outcome = invoke("simulate", inputs.wrf, *options, "--out", tmp_path / name)
+        assert outcome.exit_code == 0, outcome.output
+    picture = "C02_2007-10-23T180000.png"
+    assert len({(tmp_path / name / picture).read_bytes() for name in ("whole", "blocks")}) == 1
+    with read_result(tmp_path / "whole" / "result.nc") as whole:
+        with read_result(tmp_path / "blocks" / "result.nc") as blocks:
+            xr.testing.assert_equal(whole, blocks)
+
+
+def test_variables_that_the_scene_does_not_have_leave_nothing_behind(invoke, tmp_path, inputs):
+    options = ["--ocean-albedo", 0.03, "--bands", "C02", "--num-streams", 2, "--gases", "none"]
+    options += ["--variables", "brf,brightness_temperature", "--out", tmp_path / "out"]
+    outcome = invoke("simulate", inputs.wrf, *options)
+    assert outcome.exit_code == 2
+    assert "the result has no brightness_temperature; choose of brf, " in outcome.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
 
 
 def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
@@ -148,7 +219,8 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         "snow mixing ratio below 0, taken as 0: in 2 cells, down to -2e-09 kg kg-1",
     ):
         assert line in outcome.output
-    assert sorted(x.name for x in out.iterdir()) == ["C07_2007-10-23T180000.png", "result.nc"]
+    pictures = ["C04_2007-10-23T180000.png", "C07_2007-10-23T180000.png"]
+    assert sorted(x.name for x in out.iterdir()) == [*pictures, "result.nc"]
     with read_result(out / "result.nc") as result:
         assert result.attrs["satellite"] == "GOES-18"
         assert result.attrs["hydrometeors"] == "cloud; ice"
@@ -161,6 +233,7 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         temperature = result["brightness_temperature"].values
         assert ((temperature > 270) & (temperature < 330)).all()
         assert np.isfinite(result["radiance"]).all()
+    assert complaints(out / "result.nc") == []
 
 
 def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
@@ -285,7 +358,8 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--ocean-albedo", "0.1", "--time", "1"], "has 1 times; ask for one of them"),
         (["--ocean-albedo", "0.1", "--time", "2005-08-28"], "has no time 2005-08-28; it has"),
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
-        (["--satellite-longitude", "90"], "; give --satellite GOES-16 or GOES-17 or GOES-18"),
+        (["--variables", "radiances"], "variables ['radiances'] are not those of a result"),
+        (["--satellite-longitude", "90"], "GOES-19 without --satellite-longitude, or"),
         (["--plume-species", "dust"], "'dust' is not one of"),
     ],
 )

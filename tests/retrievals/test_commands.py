@@ -39,12 +39,23 @@ def test_retrieve_and_score(folder, run):
         assert written["result_code"].dtype == np.int8
         assert written["aod_550"].dims == ("time", "y", "x")
         assert written.attrs["Conventions"] == "CF-1.11"
+        latest, earlier = written.attrs["history"].split("\n")
+        assert f": abi-operator retrieve {folder / 'result.nc'} --out {out}" in latest
+        assert "written by abi_operator" in earlier
     csv = folder / "scores.csv"
     answer = run("score", folder / "result.nc", out, "--csv", csv)
     assert answer.exit_code == 0, answer.output
     assert answer.output.split("\n")[0].split() == "N bias rmse max r slope inside EE".split()
     assert "success: " in answer.output
     assert csv.read_text().startswith("group,num_pairs,bias,rmse,max_error,")
+    image = folder / "image.nc"
+    with xr.open_dataset(folder / "result.nc", decode_times=False) as result:
+        result.drop_vars(["pressure", "smoke_ssa", "smoke_aod_550"]).to_netcdf(image)
+    answer = run("score", image, out)
+    assert answer.exit_code == 2 and "has no smoke_aod_550; give the one that" in answer.stderr
+    answer = run("retrieve", image, "--out", folder / "x.nc")
+    assert answer.exit_code == 2 and "has no pressure, smoke_ssa; simulate a " in answer.stderr
+    assert "and without --variables" in answer.stderr
 
 
 def test_the_demonstration_ends_with_scores(folder, capsys):

@@ -101,6 +101,55 @@ def test_the_file_follows_the_conventions(path):
         assert file["smoke_ssa"].long_name == "single-scattering albedo of the plume"
 
 
+def test_a_vertical_coordinate_says_where_it_grows(path):
+    with netCDF4.Dataset(path) as file:
+        assert file["height"].positive == "up"
+        assert file["pressure"].coordinates == "height latitude longitude"
+        assert "positive" not in file["pressure"].ncattrs()
+
+
+def test_bands_have_their_names_and_wavelengths(tmp_path, results):
+    about = {"units": "um"}
+    results = [r.assign_coords(band_wavelength=("band", [0.47, 0.64], about)) for r in results]
+    path = tmp_path / "result.nc"
+    with ResultWriter(path, times=TIMES, shape=SHAPE) as writer:
+        write_all(writer, results)
+    with netCDF4.Dataset(path) as file:
+        assert file["band"].standard_name == "sensor_band_identifier"
+        assert "units" not in file["band"].ncattrs()
+        wavelength = file["band_wavelength"]
+        assert wavelength.standard_name == "sensor_band_central_radiation_wavelength"
+        assert wavelength.units == "um"
+        assert file["brf"].coordinates == "band_wavelength latitude longitude"
+        assert file["smoke_ssa"].coordinates == "band_wavelength"
+    with read_result(path) as result:
+        assert float(result["band_wavelength"].sel(band="C02")) == 0.64
+
+
+def test_a_grid_on_a_map_has_coordinates_of_it(tmp_path, results):
+    axes = {"x": ("x", 1e3 * np.arange(3.0)), "y": ("y", 1e3 * np.arange(5.0))}
+    crs = {"crs": ((), np.int32(0), {"grid_mapping_name": "mercator"})}
+    path = tmp_path / "result.nc"
+    with ResultWriter(path, times=TIMES, shape=SHAPE, grid=xr.Dataset(coords=axes | crs)) as writer:
+        write_all(writer, results)
+    with netCDF4.Dataset(path) as file:
+        assert file["crs"].grid_mapping_name == "mercator"
+        assert file["brf"].grid_mapping == file["pressure"].grid_mapping == "crs"
+        assert "grid_mapping" not in file["smoke_ssa"].ncattrs()
+    with read_result(path) as result:
+        np.testing.assert_array_equal(result["brf"].sel(y=2e3, x=1e3), result["brf"][..., 2, 1])
+    with xr.open_dataset(path) as plain:  # as a user without this package has it
+        assert set(plain["brf"].coords) == {"time", "band", "latitude", "longitude", "x", "y"}
+
+
+def test_the_history_tells_the_command(tmp_path, results):
+    words = "abi-operator simulate 'a file' --out folder"
+    with ResultWriter(tmp_path / "a.nc", times=TIMES, shape=SHAPE, command=words) as writer:
+        write_all(writer, results)
+    with netCDF4.Dataset(tmp_path / "a.nc") as file:
+        assert f"Z {words} (abi_operator " in file.history
+
+
 def test_positions_of_a_moving_grid_depend_on_time(tmp_path, results):
     results[1]["latitude"] = results[1]["latitude"] + 1
     path = tmp_path / "moving.nc"
@@ -154,8 +203,8 @@ def test_a_folder_that_is_not_there_is_an_input_error(tmp_path):
 
 def test_results_without_their_variables_are_refused(path, tmp_path):
     with read_result(path) as result:
-        result.drop_vars(["quality_flag", "pressure"]).to_netcdf(tmp_path / "less.nc")
-    with pytest.raises(InputError, match="has no pressure, quality_flag; give a result"):
+        result.drop_vars(["quality_flag", "latitude"]).to_netcdf(tmp_path / "less.nc")
+    with pytest.raises(InputError, match="has no latitude, quality_flag; give a result"):
         read_result(tmp_path / "less.nc")
     with pytest.raises(InputError, match="absent.nc does not exist"):
         read_result(tmp_path / "absent.nc")

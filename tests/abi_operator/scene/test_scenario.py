@@ -5,7 +5,7 @@ import pytest
 
 from abi_operator import ash, smoke
 from abi_operator.files import InputError
-from abi_operator.nomenclature import OPTIONAL, PLUME, QUALITY_FLAGS, SCENARIO, variable
+from abi_operator.nomenclature import BY_BAND, OPTIONAL, PLUME, QUALITY_FLAGS, SCENARIO, variable
 from abi_operator.scene import PlumeSpecification, scenario
 from abi_operator.scene.checks import check_scenario
 
@@ -29,7 +29,7 @@ def test_a_scenario_has_the_variables_of_the_nomenclature(make_scenario):
     made = make_scenario()
     expected = SCENARIO | {f"smoke_{name}": entry for name, entry in PLUME.items()} | OPTIONAL
     del expected["surface_temperature"]
-    assert set(made.variables) == {*expected, "band", "time"}
+    assert set(made.variables) == {*expected, *BY_BAND, "time"}
     for name, entry in expected.items():
         assert made[name].dims == entry.dims
         assert made[name].attrs["units"] == entry.units
