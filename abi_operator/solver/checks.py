@@ -137,7 +137,7 @@ def _surely_inside(name: str, value: Any) -> bool:
 
 
 @cache
-def _bits(name: str, dtype: np.dtype) -> tuple[Any, np.unsignedinteger] | None:
+def _bits(name: str, dtype: np.dtype) -> tuple[Any, Any] | None:
     """Integers of which a floating number is one, and the largest of a range from 0 on.
 
     None for ranges that begin elsewhere. That of moments does, but most are not negative.
