@@ -259,6 +259,45 @@ def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
         assert result.attrs["wrf_file"] == later.name
 
 
+def add_ground(path):
+    """A frozen sea, snow on the northern half of the land, land use and the model's albedo."""
+    with netCDF4.Dataset(path, "a") as file:
+        land = file["LANDMASK"][0].data
+        north = land * (np.arange(SIZE) >= SIZE // 2)[:, None]
+        grounds = {"SEAICE": 1 - land, "SNOWC": north, "ALBEDO": 0.08 + 0.17 * land}
+        grounds["LU_INDEX"] = np.where(land > 0, 16, 17)
+        for name, values in grounds.items():
+            dims = ("Time", "south_north", "west_east")
+            file.createVariable(name, "f4", dims)[0] = values
+        file.MMINLU = "MODIFIED_IGBP_MODIS_NOAH"
+    return land > 0, north > 0
+
+
+def test_grounds_without_an_albedo_file(invoke, tmp_path, inputs):
+    """Land by the model, a frozen sea and snow by their names, emissivity by land use."""
+    land, snow = add_ground(inputs.wrf)
+    options = ["--bands", "C04,C07", "--num-streams", 2, "--satellite", "GOES-18", "--time", 0]
+    options += ["--land-albedo", "model", "--snow-albedo", "old snow"]
+    options += ["--sea-ice-albedo", 0.4, "--emissivity", "land-use", "--hydrometeors", "none"]
+    outcome = invoke("simulate", inputs.wrf, *options, "--out", tmp_path / "out")
+    assert outcome.exit_code == 0, outcome.output
+    assert "warning: the albedo of land is the model's, which is one for all" in outcome.stderr
+    assert "warning: snow on the ground is simulated as if nothing stood in it" in outcome.stderr
+    for line in (
+        "albedo of the ground: land without any other the model's broadband; snow (old snow); "
+        "sea ice 0.4",
+        f"ice on the sea: {(~land).sum()} columns",
+        f"snow on the ground: {snow.sum()} columns",
+        "emissivity of the ground in C07: by land use (MODIFIED_IGBP_MODIS_NOAH) over land",
+    ):
+        assert line in outcome.output
+    with read_result(tmp_path / "out" / "result.nc") as result:
+        c04, c07 = result["surface_albedo"].isel(time=0).values
+        assert (result["quality_flag"] == 0).all()
+    np.testing.assert_allclose(c04, np.where(land, np.where(snow, 0.207, 0.25), 0.4), rtol=1e-6)
+    np.testing.assert_allclose(1 - c07, np.where(land & ~snow, 0.86, 0.984), rtol=1e-6)
+
+
 def without(path, name):
     """Rename a variable of a file, so that it has no `name`."""
     with netCDF4.Dataset(path, "a") as file:
