@@ -66,17 +66,13 @@ def projected(place: xr.Dataset) -> xr.Dataset | None:
     needed = () if number == _DEGREES else ("TRUELAT1", "STAND_LON")
     if any(name not in known for name in needed):
         return None
-    project, unit, names = _MAPS[number]
+    project, words = _MAPS[number]
     x, y, mapping = project(place["latitude"].values, _continuous(place), known)
     axes = {"x": _axis(x), "y": _axis(y.T)}
     if any(axis is None for axis in axes.values()):
         return None
     coordinates = {
-        axis: (
-            axis,
-            values,
-            {**_words(axis, names[axis]), "units": unit[axis], "axis": axis.upper()},
-        )
+        axis: (axis, values, {"axis": axis.upper(), "long_name": _LONG_NAME, **words[axis]})
         for axis, values in axes.items()
     }
     about = {"long_name": "map of the model", **mapping, "earth_radius": _RADIUS}
@@ -105,10 +101,6 @@ def _axis(values: np.ndarray) -> np.ndarray | None:
         slope = np.inf
     regular = np.abs(values - along).max() <= _OFF_GRID * abs(slope)
     return along if regular and slope > 0 else None
-
-
-def _words(axis: str, standard_name: str) -> dict[str, str]:
-    return {"standard_name": standard_name, "long_name": f"{axis} of the model's grid on its map"}
 
 
 def _offsets(longitude: np.ndarray, known: Mapping[str, float]) -> np.ndarray:
@@ -173,14 +165,15 @@ def _tangent(latitude: Any) -> Any:
 
 
 _NO_SHIFT = {"false_easting": 0.0, "false_northing": 0.0}
-_METRES = {"x": "m", "y": "m"}, {a: f"projection_{a}_coordinate" for a in ("x", "y")}
+_LONG_NAME = "coordinate of the model's grid on its map"
+_METRES = {
+    axis: {"units": "m", "standard_name": f"projection_{axis}_coordinate"} for axis in ("x", "y")
+}
+# Without standard names: CF wants one longitude and one latitude, and the positions have them.
+_DEGREES_EAST_NORTH = {"x": {"units": "degrees_east"}, "y": {"units": "degrees_north"}}
 _MAPS = {
-    _LAMBERT: (_lambert, *_METRES),
-    _POLAR: (_polar, *_METRES),
-    _MERCATOR: (_mercator, *_METRES),
-    _DEGREES: (
-        _degrees,
-        {"x": "degrees_east", "y": "degrees_north"},
-        {"x": "longitude", "y": "latitude"},
-    ),
+    _LAMBERT: (_lambert, _METRES),
+    _POLAR: (_polar, _METRES),
+    _MERCATOR: (_mercator, _METRES),
+    _DEGREES: (_degrees, _DEGREES_EAST_NORTH),
 }

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 import xarray as xr
+from conventions import complaints
 
+from abi_operator.files import ResultWriter
 from abi_operator.files.projection import projected
 
 PROJ = "+R=6370000 +units=m +no_defs"
@@ -76,7 +78,7 @@ def test_the_grid_mapping_says_so_in_the_words_of_cf(name):
     np.testing.assert_allclose(apart, 0, atol=3.0)
 
 
-def test_degrees_are_their_own_map():
+def test_degrees_are_their_own_map(tmp_path):
     longitude, latitude = np.meshgrid(np.arange(178.0, 183.0), np.arange(-2.0, 2.0))
     fields = {"latitude": latitude, "longitude": (longitude + 180) % 360 - 180}
     place = xr.Dataset({n: (("y", "x"), v) for n, v in fields.items()}, attrs={"MAP_PROJ": 6})
@@ -86,6 +88,12 @@ def test_degrees_are_their_own_map():
     np.testing.assert_allclose(grid["y"], [-2.0, -1.0, 0.0, 1.0], atol=1e-9)
     assert grid["x"].attrs["units"] == "degrees_east"
     assert projected(place.assign_attrs(POLE_LAT=40.0)) is None
+    flag = ("y", "x"), np.zeros((4, 5), np.uint8)
+    result = place.assign(quality_flag=flag).assign_coords(band=["C02"]).set_coords(list(fields))
+    times = np.array(["2007-10-23T18:00"], "datetime64[ns]")
+    with ResultWriter(tmp_path / "a.nc", times=times, shape=(4, 5), grid=grid) as writer:
+        writer.write(0, slice(0, 4), result)
+    assert complaints(tmp_path / "a.nc") == []
 
 
 def test_what_is_no_regular_grid_on_its_map_has_no_map():
