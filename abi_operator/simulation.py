@@ -4,8 +4,6 @@ This is where readers and scenes meet: `open_scene` opens and checks everything,
 writes the result and pictures of every time.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from .bands import GRASSO2013
 from .drawing import Painter
 from .files import (
     ResultWriter,
@@ -29,16 +26,13 @@ from .files import (
     rounded,
     stored,
 )
-from .files.stored import ALL
-from .nomenclature import QUALITY_FLAGS
-from .optics import ALL_GASES, ash, smoke
+from .optics import ash, smoke
 from .radiance import THERMAL
+from .report import account_lines, flag_lines, plume_lines
+from .request import Request as Request
+from .request import Species as Species
 from .scene import (
     CLASSES,
-    DropletNumber,
-    Emissivity,
-    IceAlbedo,
-    LandAlbedo,
     PlumeSpecification,
     check_absorption,
     check_classes,
@@ -53,7 +47,6 @@ from .scene import (
     completion_heights,
     highest_top,
     nearest_standard_atmosphere,
-    negative_lines,
     row_blocks,
     run,
     scenario,
@@ -61,91 +54,8 @@ from .scene import (
 
 RESULT = "result.nc"
 
-# Attributes of the scene that say where a quantity comes from, and what to call it.
-_SOURCES = {
-    "surface_albedo_source": "albedo of the ground",
-    "emissivity_source": "emissivity of the ground in C07",
-    "surface_temperature_source": "temperature of the ground",
-}
-
-# The same for how many columns something covers.
-_COVERS = {
-    "last_resort_albedo_count": "land with the albedo of last resort",
-    "sea_ice_count": "ice on the sea",
-    "snow_count": "snow on the ground",
-}
-
 # Atmospheric columns in memory at a time.
 _BLOCK_COLUMNS = 16384
-
-
-class Species(StrEnum):
-    """Plumes with published optics."""
-
-    SMOKE = "smoke"
-    ASH = "ash"
-
-
-class Request(NamedTuple):
-    """What to simulate, from which files.
-
-    Parameters
-    ----------
-    wrf
-        Output of WRF, one file or more, as `files.open_wrf_series` takes them.
-    albedo
-        MODIS albedo, as `files.read_mcd43a1` takes it.
-    ocean_albedo
-        Albedo of water, in all bands. [-]
-    plume
-        Picture of a plume, as `files.read_plume` takes it.
-    plume_species, plume_aod
-        What the plume is made of; optical depth at 550 nm where the picture is white. [-]
-    bands, broadband
-        Bands to simulate, and whether broadband albedo may stand in for a missing one.
-    emissivity
-        Of the ground in C07, as `scene.scenario` takes it.
-    land_albedo, sea_ice_albedo, snow_albedo
-        As `scene.scenario` takes them. [-]
-    gases, hydrometeors, microphysics, droplet_number
-        As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
-    satellite, satellite_longitude
-        Name; degrees, east positive, where it does not stand at its usual place.
-    time
-        Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
-    num_streams
-        Streams of the solver.
-    variables
-        What the result keeps, as `files.stored` takes it.
-    rayleigh_correction
-        Whether the air is taken out of pictures in natural colours.
-    command
-        What was typed, for the result's history.
-    """
-
-    wrf: Path | Sequence[Path]
-    albedo: Path | None = None
-    ocean_albedo: float | None = None
-    plume: Path | None = None
-    plume_species: Species = Species.SMOKE
-    plume_aod: float = 2.0
-    bands: tuple[str, ...] = GRASSO2013
-    broadband: bool = False
-    emissivity: Emissivity | None = None
-    gases: tuple[str, ...] = ALL_GASES
-    hydrometeors: tuple[str, ...] | None = None
-    microphysics: str | None = None
-    droplet_number: DropletNumber | None = None
-    satellite: str = "GOES-16"
-    satellite_longitude: float | None = None
-    time: int | str | None = None
-    num_streams: int = 8
-    land_albedo: LandAlbedo | None = None
-    sea_ice_albedo: IceAlbedo | None = None
-    snow_albedo: IceAlbedo | None = None
-    variables: tuple[str, ...] = (ALL,)
-    rayleigh_correction: bool = True
-    command: str | None = None
 
 
 class Scene(NamedTuple):
@@ -316,7 +226,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:
-        lines = [*_flag_lines(result), *_plume_lines(scene), *_account_lines(account)]
+        lines = [*flag_lines(result), *plume_lines(scene.plumes), *account_lines(account)]
     note_files(folder / RESULT, painter.names)
     return Report([RESULT, *painter.names], lines)
 
@@ -324,52 +234,3 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
 def pictures_of_before(folder: Path) -> list[str]:
     """Names of the pictures of the result that is in a folder, which another will replace."""
     return noted_files(folder / RESULT)
-
-
-def _flag_lines(result: xr.Dataset) -> Iterator[str]:
-    """How many pixels of all times carry which flag."""
-    flags = result["quality_flag"].values
-    counts = {name: np.count_nonzero(flags & bit) for name, bit in QUALITY_FLAGS.items()}
-    flagged = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
-    yield f"{flags.size} pixels; flagged: {flagged or 'none'}"
-
-
-def _plume_lines(scene: Scene) -> Iterator[str]:
-    """Where the plumes are, and how thick."""
-    for species, (plume, brightness) in scene.plumes.items():
-        largest = float(plume.aod_550) * float(brightness.max())
-        base, top = (float(height) / 1000 for height in (plume.base, plume.top))
-        yield (
-            f"plume of {species}: {np.count_nonzero(brightness)} of {brightness.size} columns, "
-            f"optical depth at 550 nm up to {largest:.2g}, {base:g} to {top:g} km above the ground"
-        )
-
-
-def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
-    """What was assumed and left out."""
-    lowest, highest = (
-        f"{float(account[f'{end}_model_top_pressure']) / 100:.0f}"
-        for end in ("smallest", "largest")
-    )
-    pressure = lowest if lowest == highest else f"{lowest} to {highest}"
-    yield f"air above {pressure} hPa: {account['air_above_model']}"
-    if account["assumed_droplet_number_count"]:
-        number = account["assumed_droplet_number"], account["assumed_droplet_number_source"]
-        yield "droplet number, assumed: {} ({})".format(*number)
-    if "standard_atmosphere" in account:
-        yield f"ozone, and vapour and temperature above: {account['standard_atmosphere']}"
-    yield f"gases that absorb: {account['gases']}"
-    for name in CLASSES:
-        if f"assumed_{name}_number_count" in account:
-            yield f"number of {name}, assumed: as the microphysics {account['microphysics']} does"
-    for name, words in _SOURCES.items():
-        if name in account:
-            yield f"{words}: {account[name]}"
-    for name, words in _COVERS.items():
-        if name in account:
-            yield f"{words}: {account[name]} columns"
-    if account["unsimulated_condensate_share"]:
-        share = 100 * float(account["unsimulated_condensate_share"])
-        kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")
-        yield f"{share:.2g} % of the condensate's mass: not simulated ({kinds})"
-    yield from negative_lines(account)

@@ -1,0 +1,80 @@
+"""What to simulate, from which files: all that a command line asks."""
+
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import NamedTuple
+
+from .bands import GRASSO2013
+from .files.stored import ALL
+from .optics import ALL_GASES
+from .scene import DropletNumber, Emissivity, IceAlbedo, LandAlbedo
+
+
+class Species(StrEnum):
+    """Plumes with published optics."""
+
+    SMOKE = "smoke"
+    ASH = "ash"
+
+
+class Request(NamedTuple):
+    """What to simulate, from which files.
+
+    Parameters
+    ----------
+    wrf
+        Output of WRF, one file or more, as `files.open_wrf_series` takes them.
+    albedo
+        MODIS albedo, as `files.read_mcd43a1` takes it.
+    ocean_albedo
+        Albedo of water, in all bands. [-]
+    plume
+        Picture of a plume, as `files.read_plume` takes it.
+    plume_species, plume_aod
+        What the plume is made of; optical depth at 550 nm where the picture is white. [-]
+    bands, broadband
+        Bands to simulate, and whether broadband albedo may stand in for a missing one.
+    emissivity
+        Of the ground in C07, as `scene.scenario` takes it.
+    land_albedo, sea_ice_albedo, snow_albedo
+        As `scene.scenario` takes them. [-]
+    gases, hydrometeors, microphysics, droplet_number
+        As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
+    satellite, satellite_longitude
+        Name; degrees, east positive, where it does not stand at its usual place.
+    time
+        Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
+    num_streams
+        Streams of the solver.
+    variables
+        What the result keeps, as `files.stored` takes it.
+    rayleigh_correction
+        Whether the air is taken out of pictures in natural colours.
+    command
+        What was typed, for the result's history.
+    """
+
+    wrf: Path | Sequence[Path]
+    albedo: Path | None = None
+    ocean_albedo: float | None = None
+    plume: Path | None = None
+    plume_species: Species = Species.SMOKE
+    plume_aod: float = 2.0
+    bands: tuple[str, ...] = GRASSO2013
+    broadband: bool = False
+    emissivity: Emissivity | None = None
+    gases: tuple[str, ...] = ALL_GASES
+    hydrometeors: tuple[str, ...] | None = None
+    microphysics: str | None = None
+    droplet_number: DropletNumber | None = None
+    satellite: str = "GOES-16"
+    satellite_longitude: float | None = None
+    time: int | str | None = None
+    num_streams: int = 8
+    land_albedo: LandAlbedo | None = None
+    sea_ice_albedo: IceAlbedo | None = None
+    snow_albedo: IceAlbedo | None = None
+    variables: tuple[str, ...] = (ALL,)
+    rayleigh_correction: bool = True
+    command: str | None = None
