@@ -70,6 +70,8 @@ PLAUSIBLE: dict[str, Range] = {
     "surface_temperature": Range(150.0, 1500.0),
     "surface_emissivity": Range(0, 1),
     "land_mask": Range(0, 1),
+    "broadband_albedo": Range(0, 1),
+    "land_use": Range(0, 255),  # numbers of categories; the longest table has 61
     "sea_ice": Range(0, 1),
     "snow_cover": Range(0, 1),
     "snow_mass": Range(0, 1e5),  # ice sheets, where a model does not stop counting before

@@ -264,7 +264,7 @@ def read_result(path: str | PathLike[str]) -> xr.Dataset:
     for array in dataset.variables.values():
         array.attrs.pop("coordinates", None)
     others = [name for name in ("band_wavelength", "crs") if name in dataset.variables]
-    return dataset.set_coords([*_POSITION, *others]).assign_coords(
+    result = dataset.set_coords([*_POSITION, *others]).assign_coords(
         time=("time", microseconds.astype("datetime64[ns]"), {"standard_name": "time"}),
         band=("band", dataset["band"].values.astype(str), dataset["band"].attrs),
     )
