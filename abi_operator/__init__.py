@@ -10,6 +10,7 @@ shines too. Exact derivatives with respect to everything in the state come by `j
 own, under `jax.jit`, and `use_compilation_cache` compiles them once and not in every process.
 """
 
+from . import _ending as _ending  # the first, as JAX takes a second to import
 from ._version import __version__ as __version__
 from .atmosphere import Atmosphere as Atmosphere
 from .atmosphere import Fire as Fire

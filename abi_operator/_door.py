@@ -132,7 +132,14 @@ def _shapes(program: Program, what: Any, leaves: Leaves) -> Any:
     return value, jax.ShapeDtypeStruct((*batch, count, number), dtype)
 
 
+def _nothing(program: Program, what: Any, leaves: Leaves) -> Any:
+    """What is wanted of no columns at all."""
+    return jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), _shapes(program, what, leaves))
+
+
 def _inlined(*leaves: Array, program: Program, what: Any) -> list[Array]:
+    if math.prod(_batch_of(program, leaves)) == 0:
+        return jax.tree.leaves(_nothing(program, what, leaves))
     return jax.tree.leaves(_inside((program.unknown(what), what), list(leaves)))
 
 
@@ -229,6 +236,8 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
     """The program of columns with values, chunk by chunk where that can be."""
     call = _in_memory(program, what, leaves)
     if call is None:
+        if math.prod(_batch_of(program, leaves)) == 0:
+            return _nothing(program, what, leaves)
         return _inside((program.known(leaves, what), what), [jnp.asarray(x) for x in leaves])
     found = map_chunks(**call)
     if what == "value":

@@ -30,6 +30,7 @@ import numpy as np
 from jax.experimental import serialize_executable
 from jax.tree_util import PyTreeDef
 
+from ._ending import unfinished
 from ._processor import processor_key
 
 # What may take part in a trace. What is pickled by its name alone must come from one of these.
@@ -106,6 +107,9 @@ def _compiled(
         structure.append(tree)
         return results
 
+    # Of no other name, so that it is compiled: a program that JAX has read from its own cache would
+    # be written without some of its kernels, and end whoever reads it ("Function ... not found").
+    flat.__name__ = f"flat_{os.urandom(8).hex()}"
     leaves, inputs = jax.tree.flatten(arguments)
     program = jax.jit(flat, compiler_options=options).lower(leaves).compile()
     (tree,) = structure
@@ -152,9 +156,10 @@ def _write(path: Path, content: bytes) -> None:
     """All of it or nothing: others read at any time."""
     part = path.with_suffix(f".{os.getpid()}")
     try:
-        part.write_bytes(content)
-        part.chmod(0o600)
-        part.replace(path)
+        with unfinished(part):
+            part.write_bytes(content)
+            part.chmod(0o600)
+            part.replace(path)
     except OSError:  # a full disk: it will be compiled again
         part.unlink(missing_ok=True)
 

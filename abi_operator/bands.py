@@ -213,7 +213,14 @@ def _is_mapping(x: Any) -> bool:
 
 
 def check_bands(bands: Sequence[str], known: Collection[str] = BANDS) -> tuple[str, ...]:
-    """Return `bands` as a tuple, or raise `ValueError` naming the ones that are not `known`."""
+    """Return `bands` as a tuple, or raise `ValueError` naming the ones that are not `known`.
+
+    A string is refused, though it is a sequence: of letters.
+    """
+    if isinstance(bands, str):
+        raise ValueError(
+            f"bands are a sequence of names, such as ({bands!r},); got the string {bands!r}."
+        )
     unknown = [name for name in bands if name not in known]
     if unknown or not bands:
         raise ValueError(f"bands {unknown or '()'} are not simulated; choose from {list(known)}.")

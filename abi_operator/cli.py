@@ -22,7 +22,8 @@ from typing import Annotated, Any
 import jax
 import typer
 
-from . import _kept
+from . import _ending, _kept
+from ._version import __version__
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence
 from .demo import write_demo
@@ -31,8 +32,15 @@ from .guard.commands import jacobian
 from .microphysics import SCHEMES
 from .optics import ALL_GASES
 from .satellites import SATELLITES
-from .scene import CLASSES
-from .simulation import Report, Request, Species, open_scene, simulate_scene
+from .scene import CLASSES, DropletNumber
+from .simulation import (
+    Report,
+    Request,
+    Species,
+    open_scene,
+    pictures_of_before,
+    simulate_scene,
+)
 from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_compiler_flags
 from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
 
@@ -45,6 +53,7 @@ _DEMO_OCEAN_ALBEDO = 0.03
 _ALL, _NONE = "all", "none"
 _NO_CACHE = "--no-cache"
 _NO_CACHE_HELP = "Use and keep no compiled programs; also behind a command's name."
+_VERSION = "Say which version this is."
 _IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
 
 
@@ -58,9 +67,11 @@ def _user_warnings() -> Iterator[None]:
         typer.echo(f"warning: {message}", err=True)
 
 
-def _print(report: Report, out: Path) -> None:
+def _print(report: Report, out: Path, before: list[str]) -> None:
     for name in report.files:
         typer.echo(f"wrote {out / name}")
+    for name in sorted(set(before) - set(report.files)):
+        typer.echo(f"removed {out / name}, a picture of the result before")
     for line in report.lines:
         typer.echo(line)
     cores = usable_cores()
@@ -68,10 +79,20 @@ def _print(report: Report, out: Path) -> None:
 
 
 def simulate(
-    wrf: Annotated[Path, typer.Argument(metavar="WRFOUT", help="Output of WRF, any times.")],
+    wrf: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="WRFOUT...",
+            help="Output of WRF: one file or more of one domain, any times, or patterns of names.",
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="Folder for the result and its pictures.")],
     time: Annotated[
-        int | None, typer.Option(min=0, help="The one time to simulate, counted from 0.")
+        str | None,
+        typer.Option(
+            help="Times to simulate, as 2005-08-28T12:00 or 2005-08-28 for those of a day, or "
+            "counted from 0; several by commas. All without."
+        ),
     ] = None,
     bands: Annotated[
         str, typer.Option(help=f"Bands to simulate, of {', '.join(BANDS)}; all: C01 to C07.")
@@ -137,6 +158,14 @@ def simulate(
             f"{', '.join(SCHEMES)}."
         ),
     ] = None,
+    droplet_number: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N | WATER,LAND",
+            help="Cloud droplets per cm3 where the model has no number of them; if not given, what "
+            "its microphysics assumes, or else 100,300.",
+        ),
+    ] = None,
     satellite: Annotated[str, typer.Option(help=f"One of {', '.join(SATELLITES)}.")] = "GOES-16",
     satellite_longitude: Annotated[
         float | None,
@@ -151,6 +180,8 @@ def simulate(
         names = check_bands(_names(bands, _IMAGER_BANDS))
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+    with one_sentence():
+        droplets = None if droplet_number is None else DropletNumber.from_text(droplet_number)
     request = Request(
         wrf,
         time=time,
@@ -168,15 +199,17 @@ def simulate(
         gases=_names(gases, ALL_GASES),
         hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
         microphysics=microphysics,
+        droplet_number=droplets,
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=num_streams,
     )
     with one_sentence(), _user_warnings():
         scene = open_scene(request)
-        with output_folder(out) as folder:
+        before = pictures_of_before(out)
+        with output_folder(out, outdated=before) as folder:
             report = simulate_scene(scene, folder)
-        _print(report, out)
+        _print(report, out, before)
 
 
 def _names(text: str, everything: tuple[str, ...]) -> tuple[str, ...]:
@@ -199,14 +232,15 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for inputs and results.")] = Path("abi-demo"),
     seed: Annotated[int, typer.Option(min=0, help="Another seed is another coast.")] = 0,
 ) -> None:
-    """Make up a smoky Californian coast, simulate it, and do what other packages add."""
+    """Make up a smoky Californian coast, simulate it, retrieve the smoke and score the result."""
     with one_sentence(), _user_warnings():
-        with output_folder(out) as folder:
+        before = pictures_of_before(out)
+        with output_folder(out, outdated=before) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
             # As in the paper, which neglects absorption by gases.
             request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume, gases=())
             report = simulate_scene(open_scene(request), folder)
-        _print(report, out)
+        _print(report, out, before)
     for entry in entry_points(group=COMMANDS, name="demo"):
         finish_demo = _load(entry)
         if finish_demo is not None:
@@ -238,12 +272,16 @@ def make_app(prepare: Callable[[bool], None] = lambda keep_programs: None) -> ty
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},  # of all commands
     )
 
     @app.callback()
     def before_every_command(  # pyright: ignore[reportUnusedFunction]
         context: typer.Context,
         no_cache: Annotated[bool, typer.Option(_NO_CACHE, help=_NO_CACHE_HELP)] = False,
+        version: Annotated[
+            bool, typer.Option("--version", callback=_say_version, is_eager=True, help=_VERSION)
+        ] = False,
     ) -> None:
         prepare(not no_cache)
         context.with_resource(jax.enable_x64(True))
@@ -258,6 +296,12 @@ def make_app(prepare: Callable[[bool], None] = lambda keep_programs: None) -> ty
     return app
 
 
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"abi-operator {__version__}")
+        raise typer.Exit
+
+
 def _cache_folder() -> str:
     try:
         return str(default_cache_folder())
@@ -266,7 +310,8 @@ def _cache_folder() -> str:
 
 
 def _prepare_process(keep_programs: bool) -> None:
-    """Settle what a process of our own computes with, before JAX starts."""
+    """Settle how a process of our own ends and what it computes with, before JAX starts."""
+    _ending.end_at_signals()
     # Tracing makes many small objects that stay; a tenth of it is a search for some that do not.
     gc.freeze()
     gc.set_threshold(50_000)
@@ -279,10 +324,10 @@ def _prepare_process(keep_programs: bool) -> None:
         _kept.use(folder)
 
 
-def main() -> None:
-    """Run the command line, in a process of its own."""
+def main(name: str | None = None) -> None:
+    """Run the command line, in a process of its own, which help calls by its name."""
     words = sys.argv[1:]
     # An option of all commands, which may stand behind the name of one as well.
     if _NO_CACHE in words:
         words = [_NO_CACHE, *(word for word in words if word != _NO_CACHE)]
-    make_app(_prepare_process)(words)
+    make_app(_prepare_process)(words, prog_name=name)

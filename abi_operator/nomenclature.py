@@ -156,6 +156,11 @@ RESULT: dict[str, Variable] = {
     ),
     "rayleigh_optical_depth": Variable(("band", "y", "x"), "1", "optical depth of the air"),
     "liquid_optical_depth": Variable(("band", "y", "x"), "1", "optical depth of the cloud"),
+    "outside_fitted_range": Variable(
+        ("band", "y", "x"),
+        "1",
+        "share of hydrometeors' optical depth at sizes beyond those that optics were fitted to",
+    ),
 }
 """The result has also ``{species}_optical_depth`` (band, y, x) and ``{species}_aod_550`` (y, x) of
 plumes, and ``{class}_optical_depth`` of hydrometeors."""
@@ -164,13 +169,8 @@ OPTIONAL_RESULT: dict[str, Variable] = {
     "brightness_temperature": Variable(
         HORIZONTAL, "K", "brightness temperature in C07", "toa_brightness_temperature"
     ),
-    "outside_fitted_range": Variable(
-        ("band", "y", "x"),
-        "1",
-        "share of hydrometeors' optical depth at sizes beyond those that optics were fitted to",
-    ),
 }
-"""What the result has where C07, and where hydrometeors beside cloud water, are simulated."""
+"""What the result has where C07 is simulated."""
 
 QUALITY_FLAGS: dict[str, int] = {
     "grazing_sun": 1,  # solar zenith angle above 80 degrees: plane-parallel air is a poor model
@@ -178,7 +178,7 @@ QUALITY_FLAGS: dict[str, int] = {
     "no_albedo": 4,  # the albedo file has no valid inversion here: nothing simulated
     "grazing_view": 8,  # view zenith angle above 80 degrees
     "out_of_sight": 16,  # satellite at or below the horizon: nothing simulated
-    "outside_fit": 32,  # more than 10 % of a band's optical depth at sizes that no fit covers
+    "outside_fit": 32,  # hydrometeors of sizes that no fit covers, see LARGEST_SHARE_OUTSIDE
     "ground_below_zero": 64,  # an anisotropic ground reflects less than nothing towards some view
     "ground_above_one": 128,  # more light leaves an anisotropic ground than falls in
 }
@@ -186,6 +186,10 @@ QUALITY_FLAGS: dict[str, int] = {
 
 GRAZING_ZENITH = 80.0
 """Zenith angle from which `QUALITY_FLAGS` call sun or view grazing. [degree]"""
+
+LARGEST_SHARE_OUTSIDE = 0.1
+"""Share of hydrometeors' optical depth at sizes that no fit covers, in any band, from which
+`QUALITY_FLAGS` call a column ``outside_fit``. [-]"""
 
 
 def variable(name: str) -> Variable | None:

@@ -68,7 +68,8 @@ class _Program(NamedTuple):
         depths = enter(_Depths(self.structure, self.options, self.own_axes), leaves)
         steepest = (np.max(np.where(np.cos(x) > 0, x, HARMLESS_ZENITH)) for x in angles)
         cosine = max(float(np.cos(max(steepest))), float(np.finfo(np.float32).eps))
-        thickest = float(np.max(np.asarray(depths)))
+        depths = np.asarray(depths)  # columns that are not finite are NaN, however they are solved
+        thickest = float(np.max(depths, where=np.isfinite(depths), initial=0))
         number = sufficient_doublings(thickest, cosine, self.options.num_streams)
         return self._replace(num_doublings=number)
 

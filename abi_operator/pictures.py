@@ -9,7 +9,6 @@ from PIL.PngImagePlugin import PngInfo
 
 # Scenes are enlarged to as many pixels along their longer side, or a few more.
 _SMALLEST = 512
-_MISSING = 128  # mid grey
 
 
 def grey(values: np.ndarray, black: float, white: float) -> np.ndarray:
@@ -31,7 +30,8 @@ def write_png(path: str | PathLike[str], rgb: np.ndarray) -> None:
     """Write a picture as PNG, north at its top and small scenes enlarged.
 
     Every pixel becomes a square of whole pixels, so that a scene has 512 or more along its longer
-    side; the PNG's text ``Scale`` tells how large the squares are. NaN is shown in mid grey.
+    side; the PNG's text ``Scale`` tells how large the squares are. Pixels with NaN are transparent,
+    as any grey would be that of clouds; a picture without any has no alpha channel.
 
     Parameters
     ----------
@@ -45,7 +45,9 @@ def write_png(path: str | PathLike[str], rgb: np.ndarray) -> None:
         raise ValueError(f"a picture has three colours, (y, x, 3); got {rgb.shape=}.")
     missing = np.isnan(rgb).any(axis=-1, keepdims=True)
     levels = np.rint(255 * np.clip(np.where(missing, 0, rgb), 0, 1))
-    picture = np.flipud(np.where(missing, _MISSING, levels).astype(np.uint8))
+    opaque = np.where(missing, 0, 255)
+    levels = np.concatenate([levels, opaque], axis=-1) if missing.any() else levels
+    picture = np.flipud(levels.astype(np.uint8))
     scale = max(1, math.ceil(_SMALLEST / max(picture.shape[:2])))
     text = PngInfo()
     text.add_text("Scale", f"{scale} x {scale} pixels per column of the scene, nearest neighbour")

@@ -1,7 +1,8 @@
 """What limits the use of a simulated column: bits, and the shares behind one of them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from types import ModuleType
 from typing import Any
 
 import jax
@@ -13,13 +14,11 @@ from ._batching import map_tiles
 from .atmosphere import State
 from .band_columns import above_horizon, ground_of
 from .bands import BANDS, GRASSO2013
-from .nomenclature import GRAZING_ZENITH, QUALITY_FLAGS
+from .nomenclature import GRAZING_ZENITH, LARGEST_SHARE_OUTSIDE, QUALITY_FLAGS
 from .optics import outside_fitted_range as outside_of_column
 from .state_checks import checked_bands, uniform
 from .surface import Report, reported
 
-LARGEST_SHARE_OUTSIDE = 0.1
-"""Share of a band's optical depth outside fitted ranges from which a column is flagged. [-]"""
 # Columns whose grounds are looked at together, from some 2000 views.
 _TILE = 64
 
@@ -30,10 +29,10 @@ def quality_flags(state: State, bands: Sequence[str] = GRASSO2013) -> UInt8[Arra
     Of their bits these are judged by a state: the sun at or below the horizon (``night``: brf NaN,
     reflectance factor 0, radiance of emission alone) or beyond 80 degrees from the zenith
     (``grazing_sun``), the same of the satellite (``out_of_sight``: all NaN; ``grazing_view``),
-    hydrometeors whose size is beyond what their optics were fitted to (``outside_fit``, in any of
-    `bands`), and anisotropic grounds that reflect less than nothing or more than all
-    (``ground_below_zero``, ``ground_above_one``, in any of `bands`, under the column's sun, which
-    must be up).
+    hydrometeors of which more than `LARGEST_SHARE_OUTSIDE` of the optical depth is at sizes beyond
+    what their optics were fitted to (``outside_fit``, in any of `bands`), and anisotropic grounds
+    that reflect less than nothing or more than all (``ground_below_zero``, ``ground_above_one``, in
+    any of `bands`, under the column's sun, which must be up).
 
     Parameters
     ----------
@@ -75,19 +74,49 @@ def _outside(state: State, bands: tuple[str, ...]) -> Array:
     return of_one(state)
 
 
+def flags_from(
+    solar_zenith: Any,
+    view_zenith: Any,
+    share_outside: Any = None,
+    found: Mapping[str, Any] | None = None,
+    *,
+    numbers: ModuleType = np,
+) -> Any:
+    """Bits of `nomenclature.QUALITY_FLAGS`, uint8, of states and of scenes alike.
+
+    Parameters
+    ----------
+    solar_zenith, view_zenith
+        Angles from the vertical, ``*batch``. [rad]
+    share_outside
+        Share of hydrometeors' optical depth at sizes that no fit covers, ``*batch band``; None
+        where it is not known yet. [-]
+    found
+        By name of the flag, where anything else was found that has one.
+    numbers
+        `numpy`, or `jax.numpy` of arrays that are traced.
+    """
+    grazing, horizon = np.deg2rad(GRAZING_ZENITH).item(), np.deg2rad(90.0).item()
+    night, away = solar_zenith >= horizon, view_zenith >= horizon
+    holds = {
+        "grazing_sun": (solar_zenith > grazing) & ~night,
+        "night": night,
+        "grazing_view": (view_zenith > grazing) & ~away,
+        "out_of_sight": away,
+        **(found or {}),
+    }
+    if share_outside is not None:
+        holds["outside_fit"] = numbers.any(share_outside > LARGEST_SHARE_OUTSIDE, axis=-1)
+    none = np.uint8(0)
+    bits = [numbers.where(x, np.uint8(QUALITY_FLAGS[k]), none) for k, x in holds.items()]
+    return sum(bits[1:], start=bits[0])
+
+
 @partial(jax.jit, static_argnums=1)
 def _flags(state: State, bands: tuple[str, ...]) -> Array:
     sun, view = state.geometry.solar_zenith, state.geometry.view_zenith
-    grazing = float(np.deg2rad(GRAZING_ZENITH))
-    night, away = jnp.cos(sun) <= 0, jnp.cos(view) <= 0
-    found = {
-        "night": night,
-        "grazing_sun": (sun > grazing) & ~night,
-        "out_of_sight": away,
-        "grazing_view": (view > grazing) & ~away,
-        "outside_fit": jnp.any(_outside(state, bands) > LARGEST_SHARE_OUTSIDE, axis=-1),
-    }
-    mu0 = jnp.cos(above_horizon(sun))
+    by_day, mu0 = jnp.cos(sun) > 0, jnp.cos(above_horizon(sun))
+    found: dict[str, Array] = {}
     for band in bands:
         ground = ground_of(state, band)
         if isinstance(ground, jax.Array):
@@ -97,9 +126,8 @@ def _flags(state: State, bands: tuple[str, ...]) -> Array:
             ("ground_below_zero", report.below_zero),
             ("ground_above_one", report.above_one),
         ):
-            found[name] = found.get(name, False) | (bad & ~night)
-    bits = [jnp.where(x, np.uint8(QUALITY_FLAGS[k]), np.uint8(0)) for k, x in found.items()]
-    return sum(bits[1:], start=bits[0])
+            found[name] = found.get(name, False) | (bad & by_day)
+    return flags_from(sun, view, _outside(state, bands), found, numbers=jnp)
 
 
 def _reported(ground: Any, mu0: Array) -> Report:

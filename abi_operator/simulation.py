@@ -5,7 +5,7 @@ writes the result and pictures of every time.
 """
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -17,11 +17,13 @@ import xarray as xr
 from .bands import GRASSO2013
 from .files import (
     ResultWriter,
+    WrfSeries,
+    note_files,
+    noted_files,
+    open_wrf_series,
     read_mcd43a1,
     read_plume,
     read_result,
-    read_wrf,
-    wrf_coordinates,
 )
 from .nomenclature import QUALITY_FLAGS
 from .optics import ALL_GASES, ash, smoke
@@ -30,6 +32,7 @@ from .products import natural_color
 from .radiance import THERMAL
 from .scene import (
     CLASSES,
+    DropletNumber,
     Emissivity,
     IceAlbedo,
     LandAlbedo,
@@ -42,10 +45,12 @@ from .scene import (
     check_ice_albedo,
     check_land_albedo,
     check_microphysics,
+    check_sight,
     classes_present,
     completion_heights,
     highest_top,
     nearest_standard_atmosphere,
+    negative_lines,
     row_blocks,
     run,
     scenario,
@@ -86,7 +91,7 @@ class Request(NamedTuple):
     Parameters
     ----------
     wrf
-        Output of WRF, with one time or more.
+        Output of WRF, one file or more, as `files.open_wrf_series` takes them.
     albedo
         MODIS albedo, as `files.read_mcd43a1` takes it.
     ocean_albedo
@@ -101,17 +106,17 @@ class Request(NamedTuple):
         Of the ground in C07, as `scene.scenario` takes it.
     land_albedo, sea_ice_albedo, snow_albedo
         As `scene.scenario` takes them. [-]
-    gases, hydrometeors, microphysics
+    gases, hydrometeors, microphysics, droplet_number
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
     satellite, satellite_longitude
         Name; degrees, east positive, where it does not stand at its usual place.
     time
-        Index of the one time to simulate; None for all. [-]
+        Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
     num_streams
         Streams of the solver.
     """
 
-    wrf: Path
+    wrf: Path | Sequence[Path]
     albedo: Path | None = None
     ocean_albedo: float | None = None
     plume: Path | None = None
@@ -123,9 +128,10 @@ class Request(NamedTuple):
     gases: tuple[str, ...] = ALL_GASES
     hydrometeors: tuple[str, ...] | None = None
     microphysics: str | None = None
+    droplet_number: DropletNumber | None = None
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
-    time: int | None = None
+    time: int | str | None = None
     num_streams: int = 8
     land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None
@@ -139,8 +145,10 @@ class Scene(NamedTuple):
     ----------
     request
         What was asked for.
+    series
+        As `files.open_wrf_series` returns.
     coordinates
-        As `files.wrf_coordinates` returns.
+        As `files.wrf_coordinates` returns, of all times and the place of the first one simulated.
     albedo, plumes
         What was read.
     chosen_times
@@ -154,6 +162,7 @@ class Scene(NamedTuple):
     """
 
     request: Request
+    series: WrfSeries
     coordinates: xr.Dataset
     albedo: xr.Dataset | None
     plumes: dict[str, PlumeSpecification]
@@ -180,9 +189,10 @@ def open_scene(request: Request) -> Scene:
     check_microphysics(request.microphysics)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
-    coordinates = wrf_coordinates(request.wrf, request.time or 0)
+    series = open_wrf_series(request.wrf)
+    times = series.find(request.time)
+    coordinates = series.coordinates(times[0])
     shape = coordinates.sizes["y"], coordinates.sizes["x"]
-    times = tuple(range(coordinates.sizes["time"])) if request.time is None else (request.time,)
     plumes = {}
     if request.plume is not None:
         brightness = read_plume(request.plume, shape)
@@ -195,7 +205,8 @@ def open_scene(request: Request) -> Scene:
         albedo = read_mcd43a1(request.albedo, solar, broadband=request.broadband)
     tops, present = [], set()
     for time in times:
-        place = wrf_coordinates(request.wrf, time)
+        place = series.coordinates(time)
+        check_sight(place, request.satellite, request.satellite_longitude)
         check_ground(
             place,
             request.bands,
@@ -205,14 +216,17 @@ def open_scene(request: Request) -> Scene:
             request.land_albedo,
         )
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
-            model = read_wrf(request.wrf, time, rows)
+            model = series.read(time, rows)
             check_land_albedo(request.land_albedo, model)
             if set(request.bands) & set(THERMAL):
                 check_emissivity(request.emissivity, model)
+            if request.droplet_number is not None:
+                request.droplet_number.over(model)
             tops.append(highest_top(model))
             present.update(classes_present(model, request.microphysics))
     return Scene(
         request,
+        series,
         coordinates,
         albedo,
         plumes,
@@ -252,12 +266,13 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         gases=request.gases,
         hydrometeors=scene.hydrometeors,
         microphysics=request.microphysics,
+        droplet_number=request.droplet_number,
         standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )
 
     def read_block(time: int, rows: slice) -> xr.Dataset:
-        return specify(read_wrf(request.wrf, scene.chosen_times[time], rows), rows=rows)
+        return specify(scene.series.read(scene.chosen_times[time], rows), rows=rows)
 
     with ResultWriter(
         folder / RESULT,
@@ -273,12 +288,21 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
             num_streams=request.num_streams,
             block_columns=_BLOCK_COLUMNS,
         )
-        files = {"wrf": request.wrf, "albedo": request.albedo, "plume": request.plume}
+        wrf = dict.fromkeys(scene.series.places[time][0].name for time in scene.chosen_times)
+        account["wrf_file"] = "; ".join(wrf)
+        files = {"albedo": request.albedo, "plume": request.plume}
         account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:
         pictures = _draw(result, folder)
-        return Report([RESULT, *pictures], [*_flag_lines(result), *_account_lines(account)])
+        report = Report([RESULT, *pictures], [*_flag_lines(result), *_account_lines(account)])
+    note_files(folder / RESULT, pictures)
+    return report
+
+
+def pictures_of_before(folder: Path) -> list[str]:
+    """Names of the pictures of the result that is in a folder, which another will replace."""
+    return noted_files(folder / RESULT)
 
 
 def _draw(result: xr.Dataset, folder: Path) -> list[str]:
@@ -321,7 +345,8 @@ def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
     pressure = lowest if lowest == highest else f"{lowest} to {highest}"
     yield f"air above {pressure} hPa: {account['air_above_model']}"
     if account["assumed_droplet_number_count"]:
-        yield f"droplet number, assumed: {account['assumed_droplet_number']}"
+        number = account["assumed_droplet_number"], account["assumed_droplet_number_source"]
+        yield "droplet number, assumed: {} ({})".format(*number)
     if "standard_atmosphere" in account:
         yield f"ozone, and vapour and temperature above: {account['standard_atmosphere']}"
     yield f"gases that absorb: {account['gases']}"
@@ -338,3 +363,4 @@ def _account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
         share = 100 * float(account["unsimulated_condensate_share"])
         kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")
         yield f"{share:.2g} % of the condensate's mass: not simulated ({kinds})"
+    yield from negative_lines(account)

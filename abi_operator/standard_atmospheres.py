@@ -59,8 +59,8 @@ def standard_atmosphere(
     name
         ``"tropical"``, ``"midlatitude_summer"``, ``"midlatitude_winter"`` or ``"us_standard"``.
     height
-        Height of the levels above sea level, top first, 0 to 120 km. Nothing is above the first
-        and nothing below the last, which is the ground. [m]
+        Height of the levels above sea level, top first, 0 to 120 km. Above the first there is air,
+        but neither vapour nor ozone, and nothing is below the last, which is the ground. [m]
     precipitable_water, ozone_column
         What the layers hold in all, by which the profile is scaled; None for the published amount.
         [kg m-2], [DU]

@@ -7,6 +7,8 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, ArrayLike, Float
 
+from abi_operator.nomenclature import QUALITY_FLAGS
+
 from .results import ResultCode
 
 NOISE_FLOOR = 4.8e-4
@@ -15,6 +17,9 @@ NOISE_SLOPE = 1.09e-5
 """Growth of the noise's variance with reflectance factor, `noise_sigma`. [-]"""
 
 _ATTEMPTED = ResultCode.SUCCESS
+# Flags of pixels that are not attempted. Optics beyond what they were fitted to are no reason: the
+# retrieval's operator has the same.
+_UNUSABLE = sum(bit for name, bit in QUALITY_FLAGS.items() if name != "outside_fit")
 
 
 class Observation(eqx.Module):
@@ -72,7 +77,7 @@ def usable(
     codes = np.full((image.sizes["y"], image.sizes["x"]), _ATTEMPTED, np.int8)
     measured = image["reflectance_factor"].sel(band=list(bands)).transpose("band", "y", "x")
     codes[~np.isfinite(measured.values).all(axis=0)] = ResultCode.INVALID_INPUT
-    codes[image["quality_flag"].values != 0] = ResultCode.UNUSABLE
+    codes[(image["quality_flag"].values & _UNUSABLE) != 0] = ResultCode.UNUSABLE
     if where == "plume":
         codes[~(image[f"{species}_brightness"].values > 0)] = ResultCode.NO_PLUME
     return codes

@@ -45,7 +45,8 @@ def amounts(air, band):
     def mixed(gas):
         exponent, reference = MIXED[band][gas]
         share = 1.0 if reference is None else air[gas] / reference
-        return share * np.diff((air["pressure"] / STANDARD_PRESSURE) ** (1.0 + exponent))
+        amount_above = (air["pressure"][1:] / STANDARD_PRESSURE) ** (1.0 + exponent)
+        return share * np.diff(amount_above, prepend=0.0)
 
     if band == "C01":
         return [ozone]

@@ -21,8 +21,11 @@ STANDARD_DEPTH = {
 
 
 def layers(pressure, band):
-    """Scattering depth of the layers between levels of a pressure [Pa], top first. [-]"""
-    return STANDARD_DEPTH[band][0] * np.diff(pressure) / STANDARD_PRESSURE
+    """Scattering depth of the layers between levels of a pressure [Pa], top first. [-]
+
+    Air above the first level is in the uppermost layer.
+    """
+    return STANDARD_DEPTH[band][0] * np.diff(pressure[1:], prepend=0.0) / STANDARD_PRESSURE
 
 
 def phase(band, num_moments):

@@ -8,6 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 
 FLOORS = [
+    {"__main__"},
     {"cli"},
     {"guard", "simulation"},
     {"commands", "demo", "scene"},
@@ -26,6 +27,7 @@ FLOORS = [
     {"_compiler", "_kept"},
     {
         "_batching",
+        "_ending",
         "_kernels",
         "_processor",
         "_slopes",

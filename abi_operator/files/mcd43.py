@@ -8,10 +8,12 @@ import numpy as np
 import xarray as xr
 
 from ..bands import check_bands
+from ..nomenclature import MODEL
 from ..surface.modis_to_abi import MODIS_TO_ABI, BandRegression
 from ..surface.ross_li import WHITE_SKY
 from .errors import InputError
 from .netcdf import FilePath, cf_attributes, load, open_netcdf, require_dims, require_variables
+from .plausible import check_values, plausible
 
 VARIABLE_MAP = {
     "BRDF_Albedo_Parameters_": "surface_albedo",
@@ -25,6 +27,9 @@ BROADBAND_STAND_IN: dict[str, str] = {"C01": "vis", "green": "vis", "C02": "vis"
 _PARAMETERS, _QUALITY = VARIABLE_MAP
 _GRID = ("time", "lat", "lon")
 _NO_INVERSION = 255
+_ADVICE = (
+    "request MCD43A1 from AppEEARS as an area sample in NetCDF-4 with the projection Geographic"
+)
 _QUALITY_ATTRIBUTES = {
     "flag_values": np.array([0, 1, _NO_INVERSION], np.uint8),
     "flag_meanings": "full_inversion magnitude_inversion no_inversion",
@@ -52,7 +57,8 @@ def read_white_sky(path: FilePath, modis_bands: Sequence[str]) -> xr.Dataset:
     InputError
         Where the file cannot be read or lacks one of the bands.
     """
-    with open_netcdf(path) as file:
+    with open_netcdf(path, advice=_ADVICE) as file:
+        _check_projection(file, path)
         lacking = [_PARAMETERS + name for name in modis_bands if _PARAMETERS + name not in file]
         if lacking:
             raise InputError(f"{path} has no {', '.join(lacking)}; request them from AppEEARS.")
@@ -103,7 +109,8 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
         none. The order of ``lat`` is the file's.
     """
     bands = check_bands(bands, MODIS_TO_ABI)
-    with open_netcdf(path) as file:
+    with open_netcdf(path, advice=_ADVICE) as file:
+        _check_projection(file, path)
         regressions = _choose_regressions(file, bands, broadband, path)
         used = tuple(dict.fromkeys(name for r in regressions for name in r.weights))
         white_sky, quality, coordinates, num_invalid = _read(file, used, path)
@@ -154,16 +161,30 @@ def _read(
     return white_sky, quality, coordinates, num_invalid
 
 
+def _check_projection(file: xr.Dataset, path: FilePath) -> None:
+    """Refuse a grid that is regular in metres, as that of MODIS itself is, not in degrees."""
+    if "lat" in file.variables and file["lat"].dims == ("lat",):
+        return
+    mappings = (array.attrs.get("grid_mapping_name") for array in file.variables.values())
+    projections = [str(name) for name in mappings if name is not None]
+    if not projections and {str(dim).lower() for dim in file.dims} >= {"xdim", "ydim"}:
+        projections = ["sinusoidal"]
+    if projections and projections[0] != "latitude_longitude":
+        raise InputError(f"{path} is in {projections[0]} projection; {_ADVICE}.")
+
+
 def _choose_regressions(
     file: xr.Dataset, bands: tuple[str, ...], broadband: bool, path: FilePath
 ) -> list[BandRegression]:
     """For each ABI band its regression on MODIS bands, or a broadband in their stead."""
-    chosen, lacking, remedy = [], [], ""
+    chosen, lacking, stand_ins = [], [], []
     for band in bands:
         regression = MODIS_TO_ABI[band]
         missing = [name for name in regression.weights if _PARAMETERS + name not in file]
         stand_in = BROADBAND_STAND_IN.get(band)
-        if missing and broadband and stand_in is not None and _PARAMETERS + stand_in in file:
+        if stand_in is not None and _PARAMETERS + stand_in not in file:
+            stand_in = None
+        if missing and broadband and stand_in is not None:
             warnings.warn(
                 f"{path} has no {_PARAMETERS}{missing[0]}; the albedo of {band} is that of the "
                 f"broadband {stand_in}.",
@@ -171,16 +192,20 @@ def _choose_regressions(
                 stacklevel=3,
             )
             regression = BandRegression({stand_in: 1.0}, 0.0)
-        else:
+        elif missing:
             lacking += missing
-            if missing and stand_in is not None and not broadband:
-                in_place = ", ".join(BROADBAND_STAND_IN)
-                remedy = f", or let broadband albedo stand in for {in_place} (option broadband)"
+            stand_ins.append(stand_in)
         chosen.append(regression)
     if lacking:
+        remedy = ""
+        if None not in stand_ins:
+            remedy = (
+                f", or let its broadband albedo ({', '.join(dict.fromkeys(stand_ins))}) stand in "
+                "for them: --broadband (in Python, broadband=True)"
+            )
+        names = ", ".join(_PARAMETERS + name for name in dict.fromkeys(lacking))
         raise InputError(
-            f"{path} has no {', '.join(_PARAMETERS + name for name in lacking)}; request these "
-            f"layers of MCD43A1 from AppEEARS{remedy}."
+            f"{path} has no {names}; request these layers of MCD43A1 from AppEEARS{remedy}."
         )
     return chosen
 
@@ -231,6 +256,10 @@ def _axis(file: xr.Dataset, name: str, path: FilePath) -> xr.DataArray:
     if not np.isfinite(values).all() or not ((steps > 0).all() or (steps < 0).all()):
         raise InputError(f"{name} in {path} is not monotonic; give the file as AppEEARS wrote it.")
     ours = {"lat": "latitude", "lon": "longitude"}[name]
+    units = MODEL[ours].units
+    check_values(
+        values, plausible(ours), units, f"{name} in {path}", lambda index: f"{name}={index[0]}"
+    )
     return xr.DataArray(values, dims=(name,), attrs=cf_attributes(ours))
 
 

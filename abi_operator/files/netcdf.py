@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..nomenclature import variable
+from .completeness import check_complete
 from .errors import InputError
 
 FilePath: TypeAlias = str | PathLike[str]
@@ -17,8 +18,10 @@ FilePath: TypeAlias = str | PathLike[str]
 _UNREADABLE = (OSError, ValueError, RuntimeError)
 
 
-def open_netcdf(path: FilePath, *, mask_and_scale: bool = True) -> xr.Dataset:
-    """Open a NetCDF file lazily, with times left as numbers.
+def open_netcdf(
+    path: FilePath, *, mask_and_scale: bool = True, advice: str = "give a NetCDF file"
+) -> xr.Dataset:
+    """Open a NetCDF file lazily, with times left as numbers; one that broke off is refused.
 
     Parameters
     ----------
@@ -26,9 +29,17 @@ def open_netcdf(path: FilePath, *, mask_and_scale: bool = True) -> xr.Dataset:
         The file; any name will do, as WRF's have colons and no suffix.
     mask_and_scale
         Whether to apply ``_FillValue``, ``scale_factor`` and ``add_offset``.
+    advice
+        What to give in place of a file of another format.
     """
     if not Path(path).is_file():
         raise InputError(f"{path} does not exist or is not a file; check the path.")
+    try:
+        check_complete(path, advice)
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be read ({error.strerror}); check who may read it."
+        ) from error
     try:
         return xr.open_dataset(
             Path(path).absolute(),
@@ -39,9 +50,7 @@ def open_netcdf(path: FilePath, *, mask_and_scale: bool = True) -> xr.Dataset:
             mask_and_scale=mask_and_scale,
         )
     except _UNREADABLE as error:
-        raise InputError(
-            f"{path} cannot be read as NetCDF ({error}); check that it is complete."
-        ) from error
+        raise InputError(f"{path} cannot be read as NetCDF ({error}); {advice}.") from error
 
 
 def require_variables(

@@ -44,7 +44,8 @@ def read_plume(path: str | PathLike[str], shape: tuple[int, int]) -> np.ndarray:
         raise
     except _UNREADABLE as error:
         raise InputError(
-            f"{path} cannot be read as a picture ({error}); save it as greyscale PNG."
+            f"{path} cannot be read as a picture ({error}); copy it again, or save it as greyscale "
+            "PNG."
         ) from error
     return np.flipud(grey).astype(np.float64) / white
 

@@ -1,6 +1,6 @@
 """The result of a scene as a CF NetCDF file, written and read block by block of rows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
@@ -18,6 +18,8 @@ from .netcdf import cf_attributes, open_netcdf, require_dims, require_variables
 
 CONVENTIONS = "CF-1.11"
 
+_SOURCE = "abi_operator "
+_FILES = "files_made_of_this_one"
 _TIME_UNITS = "seconds since 1970-01-01 00:00:00"
 _CALENDAR = "standard"
 _POSITION = ("latitude", "longitude")
@@ -77,7 +79,7 @@ class ResultWriter:
             | dict(attributes or {})
             | {
                 "Conventions": CONVENTIONS,
-                "source": f"abi_operator {__version__}",
+                "source": f"{_SOURCE}{__version__}",
                 "history": f"{now} written by abi_operator {__version__}",
             }
         )
@@ -91,10 +93,15 @@ class ResultWriter:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._file.close()
-        complete = self._written.all()
-        if kind is not None or not complete:
-            self._path.unlink(missing_ok=True)
+        complete = kind is None and bool(self._written.all())
+        try:
+            self._file.close()
+        except RuntimeError:  # what a full disk refuses to take
+            complete = False
+            raise
+        finally:
+            if not complete:
+                self._path.unlink(missing_ok=True)
         if kind is None and not complete:
             num_missing = np.count_nonzero(~self._written)
             raise ValueError(
@@ -226,10 +233,35 @@ def read_result(path: str | PathLike[str]) -> xr.Dataset:
     microseconds = np.rint(1e6 * dataset["time"].values).astype("datetime64[us]")
     for array in dataset.variables.values():
         array.attrs.pop("coordinates", None)
-    return dataset.set_coords(_POSITION).assign_coords(
+    result = dataset.set_coords(_POSITION).assign_coords(
         time=("time", microseconds.astype("datetime64[ns]"), {"standard_name": "time"}),
         band=("band", dataset["band"].values.astype(str), dataset["band"].attrs),
     )
+    result.set_close(dataset.close)  # which a Dataset does not hand on
+    return result
+
+
+def note_files(path: str | PathLike[str], names: Sequence[str]) -> None:
+    """Note in a result file which other files, in its folder, were made of it."""
+    with netCDF4.Dataset(Path(path).absolute(), "a") as file:
+        file.setncattr(_FILES, "; ".join(names))
+
+
+def noted_files(path: str | PathLike[str]) -> list[str]:
+    """Names of files beside a result file that were made of it and are still there.
+
+    None of what is no result.
+    """
+    folder = Path(path).absolute().parent
+    try:
+        with open_netcdf(path) as result:
+            attributes = result.attrs
+    except InputError:
+        return []
+    if not str(attributes.get("source", "")).startswith(_SOURCE):
+        return []
+    names = str(attributes.get(_FILES, "")).split("; ")
+    return [name for name in names if Path(name).name == name and (folder / name).is_file()]
 
 
 def _attributes(name: str, array: xr.Variable, horizontal: bool) -> dict[str, object]:

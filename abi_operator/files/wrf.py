@@ -14,11 +14,14 @@ from .errors import InputError
 from .netcdf import (
     FilePath,
     cf_attributes,
+    load,
     load_finite,
     open_netcdf,
     require_dims,
     require_variables,
 )
+from .plausible import plausible, without_traces
+from .wrf_values import DIMENSIONS, SUMS, check_block, check_stated_units
 
 VARIABLE_MAP = {
     "XLAT": "latitude",
@@ -85,13 +88,6 @@ SCHEMES: dict[int, str] = {
 }
 """MP_PHYSICS, WRF's number of a microphysics scheme: its name. (Registry.EM_COMMON of WRF)"""
 
-DIMENSIONS = {
-    "bottom_top": "layer",
-    "bottom_top_stag": "level",
-    "south_north": "y",
-    "west_east": "x",
-}
-
 # Potential temperature is stored less this, whatever the file's T00. [K]
 _THETA_OFFSET = 300.0
 # Pressure at which temperature and potential temperature agree. [Pa]
@@ -112,6 +108,7 @@ _TAKEN_AS_THEY_ARE = (
 )
 
 _ADVICE = "give a WRF output file (wrfout_*) that holds them"
+_FORMAT_ADVICE = "give a WRF output file (wrfout_*) in NetCDF"
 
 
 def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
@@ -133,7 +130,7 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
         not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
         fewer) and ``moving_nest`` (1 where positions differ from time to time, else 0).
     """
-    with open_netcdf(path) as file:
+    with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
         times = _times(file, path)
         place = {"time": time, "rows": slice(None), "path": path}
@@ -158,8 +155,9 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
 
     Pressure is P + PB, temperature (T + 300) (p / 1e5 Pa)^(2/7), with T and not the moist THM,
     and height (PH + PHB) / 9.81. Water of each kind, and the number of its particles, is per mass
-    of dry air. Advection leaves tiny negative amounts; they are set to zero, and the variable's
-    attribute ``num_negative_set_to_zero`` tells how many there were.
+    of dry air. Advection leaves small negative amounts; they are set to zero, and the variable's
+    attributes ``num_negative_set_to_zero`` and ``smallest_negative`` tell how many there were, and
+    how small. Whatever else is not in the range of `plausible.PLAUSIBLE` is an `InputError`.
 
     Parameters
     ----------
@@ -177,11 +175,12 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
         ``level y x``, top first, with the scalar coordinate ``time`` and the corners of cells,
         which those of a block share with the rows beside it.
     """
-    with open_netcdf(path) as file:
+    with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
         require_variables(file, REQUIRED, path, _ADVICE)
         times = _times(file, path)
         place = {"time": time, "rows": rows, "path": path}
         pressure = _field(file, "P", **place) + _field(file, "PB", **place)
+        _check_sum(pressure, "layer_pressure", **place)
         theta = _field(file, "T", **place) + _THETA_OFFSET
         fields = {
             "layer_pressure": pressure,
@@ -191,6 +190,8 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
         for name, ours in VARIABLE_MAP.items():
             if name in file and ours.endswith(_TAKEN_AS_THEY_ARE):
                 fields[ours] = _field(file, name, **place)
+        _check_sum(fields["layer_temperature"], "layer_temperature", **place)
+        _check_sum(fields["height"], "height", **place)
         land_mask = _land_mask(file, **place)
         if land_mask is not None:
             fields["land_mask"] = land_mask
@@ -216,11 +217,17 @@ def _field(file: xr.Dataset, name: str, *, time: int, rows: slice, path: FilePat
     fixed = "Time" not in array.dims and dims == ("y", "x")  # written once for all times
     theirs = tuple(theirs for dim in dims for theirs, own in DIMENSIONS.items() if own == dim)
     require_dims(array, theirs if fixed else ("Time", *theirs), path)
+    check_stated_units(array, ours, path)
     block = array.isel(south_north=rows) if fixed else array.isel(Time=time, south_north=rows)
-    values = load_finite(block, path)
+    values = load(block, path)
     if len(dims) == 3:
         values = values[::-1]
+    check_block(values, ours, name, time=time, rows=rows, path=path)
     return xr.DataArray(values, dims=dims, attrs=cf_attributes(ours))
+
+
+def _check_sum(array: xr.DataArray, ours: str, *, time: int, rows: slice, path: FilePath) -> None:
+    check_block(array.values, ours, SUMS[ours], time=time, rows=rows, path=path)
 
 
 def _bounds(file: xr.Dataset, *, time: int, rows: slice, path: FilePath) -> dict[str, xr.DataArray]:
@@ -255,8 +262,8 @@ def _finish(array: xr.DataArray, name: str) -> xr.DataArray:
     """Give a variable its attributes, and a mixing ratio no negative values."""
     array = array.assign_attrs(cf_attributes(name))
     if name.endswith("mixing_ratio"):
-        num_negative = int((array < 0).sum())
-        array = array.clip(min=0).assign_attrs(array.attrs, num_negative_set_to_zero=num_negative)
+        values, attributes = without_traces(array.values, plausible(name))
+        array = array.copy(data=values).assign_attrs(attributes)
     return array
 
 

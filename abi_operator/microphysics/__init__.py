@@ -22,4 +22,5 @@ from .number import number_concentration as number_concentration
 from .number import number_path as number_path
 from .schemes import SCHEMES as SCHEMES
 from .schemes import SizeDistribution as SizeDistribution
+from .schemes import own_droplet_number as own_droplet_number
 from .schemes import size_distribution as size_distribution

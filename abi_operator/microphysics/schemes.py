@@ -96,6 +96,21 @@ def size_distribution(scheme: str, name: str, *, assume: str | None = None) -> S
     return SCHEMES[used][name]
 
 
+# The scheme needs no number of droplets: what `SCHEMES` has of it is that of WSM.
+_WITHOUT_DROPLET_NUMBER = ("kessler",)
+
+
+def own_droplet_number(scheme: str) -> float | None:
+    """Number of cloud droplets per volume that a scheme itself assumes; None where it has none.
+
+    It is none where the scheme predicts the number, needs none, or is not in `SCHEMES`. [m-3]
+    """
+    if scheme not in SCHEMES or scheme in _WITHOUT_DROPLET_NUMBER:
+        return None
+    closure = SCHEMES[scheme]["cloud"].closure
+    return float(closure.number) if isinstance(closure, FixedNumber) else None
+
+
 def _by_slope(
     law: MassLaw, nu: float, closure: Closure, smallest: float, largest: float
 ) -> SizeDistribution:
@@ -118,8 +133,10 @@ def _droplets(nu: float, number: float) -> SizeDistribution:
     return _by_slope(sphere(1000.0), nu, FixedNumber(number), smallest, largest)
 
 
-# Numbers of droplets: WSM uses 3e8 m-3 where it needs one, Thompson 1e8, Morrison 2.5e8. Limits
-# of slope that a scheme lacks are so wide here (1 cm) that they do not bite.
+# Numbers of droplets: WSM uses 3e8 m-3 where it needs one (xncr of autoconversion and nc0 of
+# effective radii in WRF's source), Thompson 1e8 (Nt_c in the sources of WRF and MPAS; Thompson et
+# al., 2008), Morrison 2.5e8 (NDCNST with INUM = 1 in the sources of WRF and ERF). Limits of slope
+# that a scheme lacks are so wide here (1 cm) that they do not bite.
 _WSM_RAIN = _by_slope(sphere(1000.0), 0.0, Intercept(8e6), 1 / 8e4, 1e-2)
 _WSM_SNOW = _by_slope(sphere(100.0), 0.0, SnowIntercept(), 1 / 1e5, 1e-2)
 # D = 11.9 m^(1/2), from 12.9 um on; the 500 um of the scheme limit fall speed and not mass.

@@ -108,10 +108,13 @@ def rayleigh(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
 
     .. math:: \tau_k = \tau_0\, (p_{k+1} - p_k) / p_0, \qquad p_0 = 1013.25\ \mathrm{hPa}
 
+    Air above the first level is that of the uppermost layer, of which :math:`p_k` counts as 0: the
+    column's depth is what the pressure at the ground says, wherever the levels begin.
+
     Parameters
     ----------
     atmosphere
-        One column, of which the pressure is read. [Pa]
+        One column, of which the pressure is read (`Atmosphere.counted_pressure`). [Pa]
     band
         Band for which the depth :math:`\tau_0` at standard pressure is tabulated, by the full form
         of Bodhaine et al. (`bodhaine1999`).
@@ -120,7 +123,7 @@ def rayleigh(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
         raise ValueError(f"no Rayleigh depth for band {missing!r}; have {list(STANDARD_DEPTH)}.")
     dtype = atmosphere.pressure.dtype
     per_pascal, beta2 = constants(_constants, band.name, dtype)
-    scattering = jnp.diff(atmosphere.pressure) * per_pascal
+    scattering = jnp.diff(atmosphere.counted_pressure) * per_pascal
     phase = RayleighPhase(jnp.asarray(beta2, dtype))
     return OpticalProperties(
         scattering[None, :], jnp.ones(1, dtype), (Scatterer(scattering, phase),)

@@ -7,6 +7,7 @@ reflectances, and `run` does so for scenes that do not fit into memory. No file 
 """
 
 from .account import add_accounts as add_accounts
+from .account import negative_lines as negative_lines
 from .albedo import check_ground as check_ground
 from .angles import SATELLITE_LONGITUDE as SATELLITE_LONGITUDE
 from .column_air import completion_heights as completion_heights
@@ -28,6 +29,7 @@ from .run import row_blocks as row_blocks
 from .run import run as run
 from .scenario import check_absorption as check_absorption
 from .scenario import scenario as scenario
+from .sight import check_sight as check_sight
 from .simulate import simulate as simulate
 from .snow_and_ice import IceAlbedo as IceAlbedo
 from .snow_and_ice import check_ice_albedo as check_ice_albedo

@@ -1,10 +1,11 @@
 """What a scenario had to assume or leave out: attributes that add over the blocks of a scene."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import xarray as xr
 
+from ..nomenclature import MODEL
 from .hydrometeors import Hydrometeors
 
 Attribute = str | int | float
@@ -42,6 +43,31 @@ def condensate_warnings(found: Hydrometeors) -> list[str]:
         f"{kind} of the model is not simulated (unsimulated_condensate_share tells how much)."
         for kind in found.condensate.left_out
     ]
+
+
+def negative_account(model: xr.Dataset) -> dict[str, Attribute]:
+    """Attributes that tell of the small negative numbers in a model's output that count as 0.
+
+    By variable of the model, ``negative_{name}_count`` says of how many cells, and
+    ``smallest_negative_{name}`` how far below 0, in the units of `nomenclature.MODEL`.
+    """
+    attributes: dict[str, Attribute] = {}
+    for name, array in model.data_vars.items():
+        if array.attrs.get("num_negative_set_to_zero"):
+            attributes[f"negative_{name}_count"] = int(array.attrs["num_negative_set_to_zero"])
+            attributes[f"smallest_negative_{name}"] = float(array.attrs["smallest_negative"])
+    return attributes
+
+
+def negative_lines(account: Mapping[str, Attribute]) -> Iterator[str]:
+    """The same, in a line for each variable."""
+    for name, entry in MODEL.items():
+        if f"negative_{name}_count" in account:
+            yield (
+                f"{name.replace('_', ' ')} below 0, taken as 0: in "
+                f"{account[f'negative_{name}_count']} cells, down to "
+                f"{account[f'smallest_negative_{name}']:.2g} {entry.units}"
+            )
 
 
 def pressure_range(top_pressure: np.ndarray) -> dict[str, Attribute]:

@@ -15,7 +15,7 @@ from pyorbital.astronomy import (
 )
 
 from ..constants import SATELLITE_HEIGHT
-from ..nomenclature import GRAZING_ZENITH, QUALITY_FLAGS
+from ..quality import flags_from
 
 SATELLITE_LONGITUDE: dict[str, float] = {
     "GOES-16": -75.2,
@@ -24,6 +24,8 @@ SATELLITE_LONGITUDE: dict[str, float] = {
     "GOES-19": -75.2,
 }
 """Longitude above which each satellite stands or stood in service. [degree] (NOAA OSPO)"""
+
+_ANY_TIME = np.datetime64("2000-01-01T12:00", "ns")
 
 
 class Angles(NamedTuple):
@@ -65,6 +67,19 @@ def find_angles(
     return Angles(90 - np.degrees(altitude), view_zenith, np.minimum(apart, 360 - apart))
 
 
+def view_zenith(
+    latitude: np.ndarray, longitude: np.ndarray, satellite_longitude: float
+) -> np.ndarray:
+    """Zenith angle under which the satellite is seen, which is the same at all times. [degree]
+
+    Parameters
+    ----------
+    latitude, longitude, satellite_longitude
+        As of `find_angles`. [degree]
+    """
+    return _look(_ANY_TIME, latitude, longitude, satellite_longitude)[0]
+
+
 def _look(
     time: np.datetime64 | np.ndarray,
     latitude: np.ndarray,
@@ -98,19 +113,9 @@ def sun_distance(time: np.datetime64 | np.ndarray) -> float:
 
 
 def angle_flags(angles: Angles) -> np.ndarray:
-    """Bits of `nomenclature.QUALITY_FLAGS` that the directions set (y, x), uint8.
+    """Bits of `nomenclature.QUALITY_FLAGS` that the directions set (y, x), uint8 (`flags_from`).
 
     ``grazing_sun`` is set by day and ``grazing_view`` where the satellite is in sight: neither
     comes with ``night`` or ``out_of_sight``.
     """
-    night, out_of_sight = angles.solar_zenith >= 90, angles.view_zenith >= 90
-    bits = {
-        "grazing_sun": (angles.solar_zenith > GRAZING_ZENITH) & ~night,
-        "night": night,
-        "grazing_view": (angles.view_zenith > GRAZING_ZENITH) & ~out_of_sight,
-        "out_of_sight": out_of_sight,
-    }
-    flags = np.zeros(night.shape, np.uint8)
-    for name, holds in bits.items():
-        flags |= np.where(holds, np.uint8(QUALITY_FLAGS[name]), np.uint8(0))
-    return flags
+    return flags_from(np.radians(angles.solar_zenith), np.radians(angles.view_zenith))

@@ -7,10 +7,14 @@ import numpy as np
 import xarray as xr
 
 from ..files import InputError
+from ..files.plausible import PLAUSIBLE
 from ..nomenclature import QUALITY_FLAGS
 from .species import classes_of, species_of
 
 _INF = float("inf")
+_GROUND = PLAUSIBLE["surface_temperature"][:2]
+# What a whole column of air weighs. [kg m-2]
+_MOST_CONDENSATE = 1.0e4
 
 # Quantity of a plume: smallest and largest value, and how to say so.
 _PLUME_RANGES = {
@@ -25,7 +29,7 @@ _PLUME_RANGES = {
 # The same of what a scenario may have.
 _OPTIONAL_RANGES = {
     "temperature": (100.0, 500.0, "100 to 500 K"),
-    "surface_temperature": (150.0, 400.0, "150 to 400 K"),
+    "surface_temperature": (*_GROUND, f"{_GROUND[0]:g} to {_GROUND[1]:g} K"),
     "vapour": (0.0, _INF, "0 kg m-2 or more"),
     "ozone": (0.0, _INF, "0 DU or more"),
     "carbon_dioxide": (0.0, 1.0, "0 to 1"),
@@ -68,8 +72,12 @@ def check_scenario(scenario: xr.Dataset, first_row: int = 0) -> None:
 
 
 def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
-    for name in ("latitude", "longitude", "solar_zenith_angle", "view_zenith_angle"):
+    for name in ("solar_zenith_angle", "view_zenith_angle"):
         yield Requirement(name, "finite", np.isfinite(scenario[name].values))
+    for name in ("latitude", "longitude"):
+        lowest, highest, _ = PLAUSIBLE[name]
+        holds = _between(scenario[name].values, lowest, highest)
+        yield Requirement(name, f"{lowest:g} to {highest:g} degrees", holds)
     pressure, height = scenario["pressure"].values, scenario["height"].values
     yield Requirement("pressure", "finite and 0 Pa or more", _between(pressure, 0, _INF))
     yield Requirement("pressure", "larger than in the level above", _rises(pressure))
@@ -77,7 +85,8 @@ def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
     yield Requirement("height", "smaller than in the level above", _rises(-height))
     for name in ("liquid", *classes_of(scenario)):
         mass, number = (scenario[f"{name}_{x}_path"].values for x in ("mass", "number"))
-        yield Requirement(f"{name}_mass_path", "0 kg m-2 or more", _between(mass, 0, _INF))
+        allowed = f"0 to {_MOST_CONDENSATE:g} kg m-2"
+        yield Requirement(f"{name}_mass_path", allowed, _between(mass, 0, _MOST_CONDENSATE))
         yield Requirement(f"{name}_number_path", "0 m-2 or more", _between(number, 0, _INF))
         with_mass = (number > 0) | (mass == 0)
         yield Requirement(f"{name}_number_path", "positive where there is mass", with_mass)

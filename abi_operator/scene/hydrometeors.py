@@ -1,9 +1,9 @@
 """Mass and number of every class of condensate in the layers of a model.
 
 The number of particles is found layer by layer, from the first of these that is there: the model's
-own effective radius, the model's own number, an assumption. What is assumed of droplets is a number
-over water and over land (`DropletNumber`); of the other classes it is what the microphysics scheme
-of the model implies (`abi_operator.microphysics`).
+own effective radius, the model's own number, an assumption. What is assumed is what the
+microphysics scheme of the model implies (`abi_operator.microphysics`); of droplets it can be
+chosen, and is a general number where the scheme has none (`assumed_droplets`).
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ from .condensate import (
     scheme_of,
     weigh,
 )
-from .droplet_number import DropletNumber
+from .droplet_number import AssumedDroplets, DropletNumber, assumed_droplets
 
 
 class Paths(NamedTuple):
@@ -56,16 +56,19 @@ class Hydrometeors(NamedTuple):
         What of the model's is simulated.
     scheme
         Microphysics scheme that numbers are assumed after.
+    droplets
+        Numbers of droplets that are assumed where the model has none.
     """
 
     paths: dict[str, Paths]
     condensate: Condensate
     scheme: str
+    droplets: AssumedDroplets
 
 
 def hydrometeor_paths(
     model: xr.Dataset,
-    droplet_number: DropletNumber,
+    droplet_number: DropletNumber | None = None,
     *,
     classes: tuple[str, ...] | None = None,
     microphysics: str | None = None,
@@ -80,7 +83,7 @@ def hydrometeor_paths(
     model
         A model Dataset.
     droplet_number
-        Number of droplets where the model has none.
+        Number of droplets where the model has none; None for that of the scheme, or general ones.
     classes
         Classes to simulate beside cloud water; None for those that have any mass.
     microphysics
@@ -95,6 +98,7 @@ def hydrometeor_paths(
     if classes is None:
         classes = classes_present(model, microphysics)
     scheme = scheme_of(model, microphysics)
+    droplets = assumed_droplets(droplet_number, scheme)
     air = dry_air_path(model)
     masses = {n: air * ratio for n, ratio in mixing_ratios(model, microphysics).items()}
     thickness = -np.diff(model["height"].values, axis=0)
@@ -104,14 +108,14 @@ def hydrometeor_paths(
         number = _number_of_model(model, name, mass, air)
         without = (mass > 0) & ~(number > 0)
         if name == "cloud":
-            number = np.where(without, droplet_number.over(model) * thickness, number)
+            number = np.where(without, droplets.number.over(model) * thickness, number)
         elif without.any() and (_closes(scheme, name) or not _has_number(model, name)):
             number = np.where(without, _assumed(model, name, mass, thickness, scheme), number)
         paths[name] = Paths(
             np.where(number > 0, mass, 0), number, int((without & (number > 0)).sum())
         )
     simulated = {name: path.mass for name, path in paths.items()}
-    return Hydrometeors(paths, weigh(masses, simulated), scheme)
+    return Hydrometeors(paths, weigh(masses, simulated), scheme, droplets)
 
 
 def check_microphysics(microphysics: str | None) -> None:

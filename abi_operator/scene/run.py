@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
+from ..radiance import THERMAL
 from .account import Attribute, add_accounts
+from .progress import Progress
 from .simulate import simulate
 
 ReadBlock = Callable[[int, slice], xr.Dataset]
@@ -62,11 +63,15 @@ def run(
     """
     account: dict[str, Attribute] = {}
     total = len(times) * shape[0] * shape[1]
-    with tqdm(total=total, unit="columns", disable=None if progress else True) as bar:
+    with Progress(total, show=progress) as bar:
         for time_index in range(len(times)):
             for rows in row_blocks(shape, block_columns):
-                result = simulate(read_block(time_index, rows), num_streams=num_streams)
+                block = read_block(time_index, rows)
+                thermal = np.isin(block["band"].values, list(THERMAL))
+                programs = int(thermal.sum()) + bool((~thermal).any())
+                bar.begin(block.sizes["y"] * block.sizes["x"], programs)
+                result = simulate(block, num_streams=num_streams, listener=bar)
                 write_block(time_index, rows, result)
                 account = add_accounts([account, result.attrs])
-                bar.update(result.sizes["y"] * result.sizes["x"])
+                bar.end()
     return account

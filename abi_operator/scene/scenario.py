@@ -13,7 +13,13 @@ from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import ALL_GASES
 from ..radiance import THERMAL
 from ..satellites import SATELLITES, gas_fit_covers
-from .account import condensate_account, condensate_warnings, model_attributes, pressure_range
+from .account import (
+    condensate_account,
+    condensate_warnings,
+    model_attributes,
+    negative_account,
+    pressure_range,
+)
 from .albedo import surface_albedo
 from .angles import SATELLITE_LONGITUDE, angle_flags, find_angles
 from .checks import check_scenario
@@ -90,7 +96,8 @@ def scenario(
         Scheme of `abi_operator.microphysics` by which the model's condensate is understood; None
         for the model's own.
     droplet_number
-        Number of droplets where the model has none; None for `DropletNumber`'s defaults. [m-3]
+        Number of droplets where the model has none; None for that of the microphysics
+        scheme, or general ones where it has none (`DropletNumber`). [m-3]
     standard_atmosphere
         Name of the one that gives ozone, and what is above the model; None for the nearest
         (`nearest_standard_atmosphere`). The blocks of a scene need the same.
@@ -116,7 +123,6 @@ def scenario(
     """
     bands, gases = check_bands(bands), check_gases(tuple(gases))
     check_absorption(satellite, bands, gases)
-    droplet_number = droplet_number or DropletNumber()
     if added_heights is None:
         added_heights = completion_heights(highest_top(model))
     pressure, height, top_pressure = complete_air(model, tuple(added_heights))
@@ -172,7 +178,8 @@ def scenario(
         "gases": gases_attribute(gases),
         "air_above_model": "US Standard Atmosphere 1976, scaled to the pressure at the model's top",
         "num_levels_above_model": len(added_heights),
-        "assumed_droplet_number": droplet_number.describe(model),
+        "assumed_droplet_number": condensate.droplets.number.describe(model),
+        "assumed_droplet_number_source": condensate.droplets.source,
         "assumed_droplet_number_count": condensate.paths["cloud"].num_assumed,
     }
     return dataset.assign_attrs(
@@ -182,6 +189,7 @@ def scenario(
         | ground_sources
         | pressure_range(top_pressure)
         | condensate_account(condensate)
+        | negative_account(model)
     )
 
 

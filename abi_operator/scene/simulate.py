@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from .._chunks import map_chunks
+from .._chunks import Listener, listening, map_chunks
 from ..atmosphere import Atmosphere, State
 from ..bands import BANDS, check_bands
 from ..files import InputError
@@ -17,6 +17,7 @@ from ..files.netcdf import cf_attributes
 from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import aerosol, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
 from ..planck import brightness_temperature
+from ..quality import flags_from
 from ..radiance import THERMAL, radiance
 from ..reflectance import brf
 from ..satellites import solar_irradiance
@@ -37,6 +38,7 @@ def simulate(
     bands: Sequence[str] | None = None,
     gases: Sequence[str] | None = None,
     num_streams: int = 8,
+    listener: Listener | None = None,
 ) -> xr.Dataset:
     r"""Simulate the radiances and reflectances of a scenario.
 
@@ -54,15 +56,19 @@ def simulate(
         Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams
         Streams of the solver; see `solver.toa_brf`.
+    listener
+        Is told of columns as they are solved: all that can be in the bands without emission, then
+        all that can be in each of the others.
 
     Returns
     -------
     xarray.Dataset
         The scenario with the variables of `nomenclature.RESULT` and optical depths of its plumes
-        and hydrometeors; with C07 brightness temperature; with hydrometeors the share of optical
-        depth that is beyond the range of sizes for which optics were fitted. C07 has no reflectance
-        factor and no brf, which are NaN. By night the reflectance factor is 0 and brf NaN; without
-        albedo, and out of the satellite's sight, all is NaN.
+        and hydrometeors; with C07 brightness temperature; and the share of hydrometeors' optical
+        depth at sizes for which optics were not fitted, by which pixels are flagged
+        ``outside_fit``. C07 has no reflectance factor and no brf, which are NaN. By night the
+        reflectance factor is 0 and brf NaN; without albedo, and out of the satellite's sight, all
+        is NaN.
 
     Raises
     ------
@@ -76,16 +82,20 @@ def simulate(
     if gases and "vapour" not in scenario:
         raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
     states = column_states(scenario, bands)
-    fields = _optical_depths(states.atmosphere, bands)
+    with listening(None if listener is None else _Beforehand(listener)):
+        fields = _optical_depths(states.atmosphere, bands)
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
+    flags = flags | _flags(states, fields["outside_fitted_range"])
     options = {"gases": gases, "num_streams": num_streams}
-    fields |= _reflectances(states, flags, bands, options)
+    with listening(listener):
+        fields |= _reflectances(states, flags, bands, options)
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
     distance = sun_distance(scenario["time"].values) if "time" in scenario.variables else 1.0
     light = [solar_irradiance(band, satellite) / (np.pi * distance**2) for band in bands]
     fields["radiance"] = fields["reflectance_factor"] * np.array(light)
     for band in set(bands) & set(THERMAL):
-        seen = _radiance(states, flags, band, satellite, distance, options)
+        with listening(listener):
+            seen = _radiance(states, flags, band, satellite, distance, options)
         fields["radiance"][:, bands.index(band)] = seen
         fields["brightness_temperature"] = np.asarray(
             brightness_temperature(jnp.asarray(seen), band, satellite)
@@ -98,7 +108,27 @@ def simulate(
         by_column = np.moveaxis(values, 0, -1)
         array = by_column.reshape(*by_column.shape[:-1], *shape.values())
         result[name] = ((*own_dims, *shape), array, cf_attributes(name))
+    known = result["quality_flag"]
+    result["quality_flag"] = known.dims, flags.reshape(known.shape), known.attrs
     return result.assign_attrs(num_streams=num_streams, gases=gases_attribute(gases))
+
+
+def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:
+    """Bits of ``quality_flag`` (column) of the states themselves, as `quality_flags` has them."""
+    sun, view = states.geometry.solar_zenith, states.geometry.view_zenith
+    return flags_from(np.asarray(sun), np.asarray(view), share_outside)
+
+
+class _Beforehand(NamedTuple):
+    """Hears for a listener of what is compiled, but not of columns, which are solved later."""
+
+    listener: Listener
+
+    def compiling(self, begins: bool) -> None:
+        self.listener.compiling(begins)
+
+    def solved(self, columns: int) -> None:
+        pass
 
 
 def _reflectances(
@@ -162,9 +192,8 @@ def _depths_of_chunk(leaves: list[jax.Array], structure: Any, bands: tuple[str, 
             )
             for name, producer in producers.items()
         }
-        if column.hydrometeors:
-            outside = [outside_fitted_range(column, BANDS[b]) for b in bands]
-            by_band["outside_fitted_range"] = jnp.stack(outside)
+        outside = [outside_fitted_range(column, BANDS[b]) for b in bands]
+        by_band["outside_fitted_range"] = jnp.stack(outside)
         return by_band | {f"{name}_aod_550": p.aod_550 for name, p in column.plumes.items()}
 
     return jax.vmap(depths)(jax.tree.unflatten(structure, leaves))

@@ -22,7 +22,7 @@ def toa_albedo(
     delta_m: bool = True,
     secant: Float[ArrayLike, "*batch layer"] | None = None,
     num_doublings: int | None = None,
-    check_values: bool = False,
+    check_values: bool | None = None,
 ) -> Float[Array, "*batch"]:
     r"""Plane albedo at the top: upward flux over :math:`\mu_0 F_0`. [-]
 
@@ -49,7 +49,7 @@ def toa_albedo(
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return solve(plane_albedo, column, options, True, by_view=False)
+    return solve(plane_albedo, column, options, True, by_view=False, check_values=check_values)
 
 
 class SurfaceCoupling(eqx.Module):
@@ -109,7 +109,7 @@ def surface_coupling(
     secant: Float[ArrayLike, "*batch layer"] | None = None,
     multiple_views: bool = False,
     num_doublings: int | None = None,
-    check_values: bool = False,
+    check_values: bool | None = None,
 ) -> SurfaceCoupling:
     """How a Lambertian ground of any albedo shows through these columns, in one solve.
 
@@ -143,6 +143,8 @@ def surface_coupling(
         check_values=check_values,
     )
     by_view = GroundResponse._make([True, True, False])  # the spherical albedo has no view
-    found = solve(ground_response, column, options, multiple_views, by_view=by_view)
+    found = solve(
+        ground_response, column, options, multiple_views, by_view=by_view, check_values=check_values
+    )
     black, coupling, spherical = found
     return SurfaceCoupling(black, coupling, spherical, multiple_views)

@@ -1,10 +1,12 @@
 """Checks of the values of the solver's arguments, outside any compilation.
 
-They read every number on the host, so they are asked for, not always made: without
-``check_values=True`` nothing here is called. The first argument that offends is reported, in the
-order of the call.
+`check_in_memory` is made of every call whose arguments lie in memory, so it must take next to no
+time: it reads each array once, as integers, and looks closer only where that leaves a doubt.
+`check_arguments` is what looks closer. The first argument that offends is reported, in the order of
+the call.
 """
 
+from functools import cache
 from typing import Any
 
 import jax
@@ -15,6 +17,8 @@ _FINITE = (-np.inf, np.inf, "()")
 _NOT_NEGATIVE = (0.0, np.inf, "[)")
 _UNIT_INTERVAL = (0.0, 1.0, "[]")
 _COSINE = (0.0, 1.0, "(]")
+# Radians: a difference of two azimuths is 2 pi at most, and what is more is degrees.
+_AZIMUTH = (-6.2832, 6.2832, "[]")
 
 # Lowest and highest value, and which of the two belong to the range.
 RANGES = {
@@ -24,7 +28,7 @@ RANGES = {
     "albedo": _UNIT_INTERVAL,
     "mu0": _COSINE,
     "mu": _COSINE,
-    "relative_azimuth": _FINITE,
+    "relative_azimuth": _AZIMUTH,
     "phase_function": _NOT_NEGATIVE,
     "secant": (0.0, np.inf, "()"),
     "solar_irradiance": _NOT_NEGATIVE,
@@ -42,9 +46,9 @@ def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
 
     tau, phase_function, solar_irradiance, planck_levels, surface_emission and isotropic_top must be
     0 or more, secant above 0, ssa and a Lambertian albedo in [0, 1], moments in [-1, 1], mu0 and mu
-    in (0, 1]; all must be finite. Exceptions: chi_0, which the solver does not read, need only be
-    finite, and so need mu0 where solar_irradiance is 0. Each number is judged in its own precision:
-    one step above 1 is outside [0, 1].
+    in (0, 1], relative_azimuth in [-2 pi, 2 pi]; all must be finite. Exceptions: chi_0, which the
+    solver does not read, need only be finite, and so need mu0 where solar_irradiance is 0. Each
+    number is judged in its own precision: one step above 1 is outside [0, 1].
 
     Parameters
     ----------
@@ -92,6 +96,62 @@ def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
         _check_series(*(np.asarray(arguments[name]) for name in ("tau", "ssa", "moments")))
 
 
+def check_in_memory(arguments: dict[str, Any]) -> None:
+    """`check_arguments` of arrays that can be read at once; others are let pass.
+
+    Those are traced ones and those on another device than the CPU. Series are not judged.
+    """
+    given = {name: x for name, x in arguments.items() if x is not None}
+    others = [x for x in given.values() if type(x) is not np.ndarray]
+    if others and not all(map(_is_on_host, jax.tree.leaves(others))):
+        return
+    if not all(_surely_inside(name, x) for name, x in given.items()):
+        check_arguments(arguments, series_summed=False)
+
+
+def _is_on_host(x: Any) -> bool:
+    if isinstance(x, jax.Array):
+        return not isinstance(x, Tracer) and all(d.platform == "cpu" for d in x.devices())
+    return isinstance(x, np.ndarray)
+
+
+def _surely_inside(name: str, value: Any) -> bool:
+    """Whether all numbers are in the range of an argument; False where it takes a closer look.
+
+    Floating numbers from 0 on are ordered as their bits are, read as integers; negative ones and
+    NaN come after all others. So one integer tells, and is found in one pass.
+    """
+    if not isinstance(value, np.ndarray | jax.Array):
+        return False
+    x = np.asarray(value)
+    if x.size == 0:
+        return True
+    limits = _bits(name, x.dtype)
+    if limits is not None and x.flags.c_contiguous:
+        integers, largest = limits
+        return bool(x.view(integers).max() <= largest)
+    low, high, ends = RANGES[name]
+    smallest, largest = x.min(), x.max()
+    above = smallest >= low if ends[0] == "[" else smallest > low
+    return bool(above and (largest <= high if ends[1] == "]" else largest < high))
+
+
+@cache
+def _bits(name: str, dtype: np.dtype) -> tuple[Any, np.unsignedinteger] | None:
+    """Integers of which a floating number is one, and the largest of a range from 0 on.
+
+    None for ranges that begin elsewhere. That of moments does, but most are not negative.
+    """
+    low, high, ends = RANGES[name]
+    integers = {4: np.uint32, 8: np.uint64}.get(dtype.itemsize)
+    from_zero = (low == 0 and ends[0] == "[") or name == "moments"
+    if integers is None or dtype.kind != "f" or not from_zero:
+        return None
+    end = np.asarray(high, dtype)
+    largest = end if ends[1] == "]" else np.nextafter(end, np.zeros_like(end))
+    return integers, largest.view(integers)[()]
+
+
 def _is_surface(albedo: Any) -> bool:
     # A list of numbers is an array to the solver, although a pytree of many leaves to JAX.
     if isinstance(albedo, list | tuple):
@@ -121,7 +181,9 @@ def _check_range(
     if np.any(bad):
         index, others = _first(bad)
         interval = f"{ends[0]}{low:g}, {high:g}{ends[1]}"
-        raise ValueError(f"{name}{_subscript(index)} = {x[index]!s} is outside {interval}{others}.")
+        unit = " rad" if name == "relative_azimuth" else ""
+        label = f"{name}{_subscript(index)} = {x[index]!s}"
+        raise ValueError(f"{label} is outside {interval}{unit}{others}.")
 
 
 def _check_series(tau: np.ndarray, ssa: np.ndarray, moments: np.ndarray) -> None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from .._batching import on_every_device
 from .._numerics import converted
@@ -52,7 +53,9 @@ OWN_AXES = {
 class Options(NamedTuple):
     """What is static in a program of the solver; see `toa_brf`.
 
-    Without a number of doublings every layer of a value has its own (`doublings`).
+    Without a number of doublings every layer of a value has its own (`doublings`). Where the number
+    is for layers that nobody has read (`unread`), columns with one that it does not suffice for are
+    NaN.
     """
 
     num_streams: int
@@ -60,6 +63,7 @@ class Options(NamedTuple):
     delta_m: bool
     tms: bool
     num_doublings: int | None
+    unread: bool = False
 
 
 def promoted(**arguments: Any) -> Column:
@@ -70,8 +74,7 @@ def promoted(**arguments: Any) -> Column:
     """
     if isinstance(arguments["albedo"], Lambertian):
         arguments["albedo"] = arguments["albedo"].albedo
-    # A list of numbers is an array here, although a pytree of many leaves to JAX.
-    arguments = {k: np.asarray(x) if isinstance(x, list) else x for k, x in arguments.items()}
+    arguments = {k: _array(x) if isinstance(x, list | tuple) else x for k, x in arguments.items()}
     leaves, structure = jax.tree.flatten(Column(**arguments))
     arrays = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
     types = [
@@ -80,6 +83,14 @@ def promoted(**arguments: Any) -> Column:
     ]
     dtype = jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
     return jax.tree.unflatten(structure, [converted(x, dtype) for x in arrays])
+
+
+def _array(x: Any) -> Any:
+    """A list of numbers is an array here, although a pytree of many leaves to JAX."""
+    if isinstance(x, AnySurface):  # a NamedTuple may be one
+        return x
+    traced = any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(x))
+    return jnp.asarray(x) if traced else np.asarray(x)
 
 
 def check_shapes(column: Column, num_moments: int, multiple_views: bool) -> None:
@@ -110,6 +121,8 @@ def _check_these(
                 f"{name} must have one level more than there are layers; got {levels} levels for "
                 f"{num_layers} layers."
             )
+    if empty := [name for name, size in sizes["layer"] if size == 0]:
+        raise ValueError(f"a column has one layer or more; there is none in {', '.join(empty)}.")
     for axis in ("layer", "view"):
         found = sizes.get(axis, [])
         if len({size for _, size in found} - {1}) > 1:
@@ -152,13 +165,16 @@ def names(structure: Any) -> tuple[str, ...]:
 
 
 def choose_doublings(column: Column, num_streams: int) -> int:
-    """Smallest number offered that suffices for the largest of concrete layers."""
+    """Smallest number offered that suffices for the largest of concrete layers.
+
+    Columns that are not finite do not count.
+    """
     sun = column.mu0 if column.secant is None else 1 / np.asarray(column.secant)
     beams = [np.asarray(column.mu), np.asarray(sun)]
-    if column.tau.size == 0:
-        return 0
-    min_mu = min(float(np.min(x)) for x in beams if x.size)
-    return sufficient_doublings(float(np.max(column.tau)), min_mu, num_streams)
+    min_mu = min(float(np.min(x, where=x > 0, initial=1)) for x in beams)
+    tau = np.asarray(column.tau)
+    max_tau = float(np.max(tau, where=np.isfinite(tau), initial=0))
+    return sufficient_doublings(max_tau, min_mu, num_streams)
 
 
 def solved(column: Column, multiple_views: bool, solve: Callable[[Column], Any]) -> Any:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from .._batching import tile_size
 from .._door import Leaves, enter
 from .._slopes import slopes_by_reverse_mode
-from .checks import check_arguments
+from .checks import check_arguments, check_in_memory
 from .column import (
     Column,
     Options,
@@ -34,12 +34,13 @@ def prepare(
     single_scattering: str | None,
     multiple_views: bool,
     num_doublings: int | None,
-    check_values: bool,
+    check_values: bool | None,
     checked: Column | None = None,
 ) -> Options:
     """What every door does with its promoted arguments before the program: check and choose.
 
-    Values are checked in `checked` where the column to solve is not what the caller gave.
+    Values are checked here where they must be, in `checked` if the column to solve is not what the
+    caller gave; where they may be that is left to `solve`.
     """
     check_options(num_streams, num_modes, single_scattering, num_doublings)
     check_shapes(column, num_streams + 1 if delta_m else num_streams, multiple_views)
@@ -63,6 +64,7 @@ def solve(
     multiple_views: bool,
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None = None,
     by_view: Any = True,
+    check_values: bool | None = None,
 ) -> Any:
     """Solve columns, with derivatives, `jax.vmap` and threads as they are cheapest.
 
@@ -76,9 +78,13 @@ def solve(
         As in `independent_columns`, of `tile`.
     by_view
         Which results of `tile` have an axis of views: a pytree of bools of the same structure.
+    check_values
+        None to check values where there are any, under derivatives and `jax.vmap` too.
     """
     leaves, structure = jax.tree.flatten(column)
-    return enter(_Program(tile, gradient, options, multiple_views, structure, by_view), leaves)
+    checked = check_values is not None
+    program = _Program(tile, gradient, options, multiple_views, structure, by_view, checked)
+    return enter(program, leaves)
 
 
 class _Program(NamedTuple):
@@ -90,23 +96,27 @@ class _Program(NamedTuple):
     multiple_views: bool
     structure: Any
     by_view: Any
+    checked: bool
 
     @property
     def own_axes(self) -> tuple[int, ...]:
         return _own_axes(self.structure, self.multiple_views)
 
     def known(self, leaves: Leaves, what: Any) -> "_Program":
-        if what == "value" or self.options.num_doublings is not None:
-            return self
         column = jax.tree.unflatten(self.structure, leaves)
+        if not self.checked:
+            check_in_memory(column._asdict())
+        if what == "value" or self.options.num_doublings is not None:
+            return self._replace(checked=True)
         number = choose_doublings(column, self.options.num_streams)
-        return self._replace(options=self.options._replace(num_doublings=number))
+        return self._replace(options=self.options._replace(num_doublings=number), checked=True)
 
     def unknown(self, what: Any) -> "_Program":
         if what == "value" or self.options.num_doublings is not None:
-            return self
+            return self._replace(checked=True)
         number = unknown_doublings(self.options.num_streams)
-        return self._replace(options=self.options._replace(num_doublings=number))
+        options = self.options._replace(num_doublings=number, unread=True)
+        return self._replace(options=options, checked=True)
 
     def own_result(self, leaves: Leaves) -> Any:
         column = jax.tree.unflatten(self.structure, leaves)

@@ -106,9 +106,7 @@ def layer_doublings(
     Columns that are not finite do not count.
     """
     limit = _MOST if most is None else most
-    tau, secants = jax.lax.stop_gradient((tau, secants))
-    steepest = jnp.maximum(jnp.max(secants, axis=0), 1 / double_gauss(num_streams)[0][0].item())
-    z = 0.5 * tau * steepest
+    z = _half_thickness(tau, secants, num_streams)
     z = jnp.where(jnp.isfinite(z), z, 0).reshape(tau.shape[0], -1)
     thickest = jnp.max(z, axis=1, initial=0)
     reach = np.array([_reach(k) for k in range(limit)])
@@ -116,6 +114,30 @@ def layer_doublings(
     count = jnp.sum(thickest[:, None] > reach, axis=1)
     table = np.array([_numbers(k) for k in range(limit + 1)])
     return Doublings(jnp.asarray(table, tau.dtype)[count], most)
+
+
+def within_reach(
+    tau: Float[Array, "layer *batch"],
+    secants: Float[Array, "beam layer *batch"],
+    num_streams: int,
+    most: int,
+) -> Float[Array, "layer *batch"]:
+    """1 where so many doublings of a layer are enough, else NaN: a factor of its optical depth.
+
+    Parameters
+    ----------
+    tau, secants, num_streams, most
+        As in `layer_doublings`.
+    """
+    z = _half_thickness(tau, secants, num_streams)
+    return jnp.where(z > _reach(most), jnp.nan, 1).astype(tau.dtype)
+
+
+def _half_thickness(tau: Array, secants: Array, num_streams: int) -> Array:
+    """Optical depth of half a layer on the steepest path through it, without a derivative."""
+    tau, secants = jax.lax.stop_gradient((tau, secants))
+    steepest = jnp.maximum(jnp.max(secants, axis=0), 1 / double_gauss(num_streams)[0][0].item())
+    return 0.5 * tau * steepest
 
 
 def _reach(doublings: int) -> float:

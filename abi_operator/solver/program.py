@@ -22,7 +22,7 @@ from .bordered import Bordered, Vector
 from .column import Column, Options
 from .delta_m import ScaledLayers, unscaled
 from .delta_m import delta_m as scale_delta_m
-from .doublings import layer_doublings
+from .doublings import layer_doublings, within_reach
 from .ground import black, isotropic, lambertian, reflecting
 from .legendre import legendre_series
 from .single_scatter import (
@@ -114,11 +114,14 @@ class _Problem:
         views = jnp.broadcast_to(
             1 / self.directions.cosines[1:, None], (column.mu.shape[0], *column.tau.shape)
         )
+        secants = jnp.concatenate([self.directions.sun_secants[None], views])
+        if options.unread:
+            assert options.num_doublings is not None
+            limits = secants, num_streams, options.num_doublings
+            tau = self.layers.tau * within_reach(self.layers.tau, *limits)
+            self.layers = self.layers._replace(tau=tau)
         self.doublings = layer_doublings(
-            self.layers.tau,
-            jnp.concatenate([self.directions.sun_secants[None], views]),
-            num_streams,
-            options.num_doublings,
+            self.layers.tau, secants, num_streams, options.num_doublings
         )
         self.one: Vector = isotropic(num_streams, self.directions.cosines)
         self.tables = legendre_tables(num_streams, options.num_modes, self.directions.cosines)

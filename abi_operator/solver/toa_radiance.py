@@ -34,7 +34,7 @@ def toa_radiance(
     secant: Float[ArrayLike, "*batch layer"] | None = None,
     multiple_views: bool = False,
     num_doublings: int | None = None,
-    check_values: bool = False,
+    check_values: bool | None = None,
 ) -> Float[Array, "*batch"]:
     r"""Radiance at the top of the atmosphere, in the units of its sources.
 
@@ -97,7 +97,7 @@ num_doublings, check_values
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return solve(_radiance, column, options, multiple_views)
+    return solve(_radiance, column, options, multiple_views, check_values=check_values)
 
 
 def _with_harmless_sun(column: Column) -> Column:

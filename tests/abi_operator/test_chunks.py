@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator._chunks import begin_chunks, cut, map_chunks
+from abi_operator._chunks import begin_chunks, cut, listening, map_chunks
 from abi_operator.solver import toa_brf
 
 WIDTHS = 8, 64, 512
@@ -152,3 +152,34 @@ def test_nothing_is_cut_where_the_caller_says_what_runs_where():
     with jax.default_device(jax.local_devices()[0]):
         found = toa_brf(*columns, **OPTIONS)
     np.testing.assert_allclose(found, toa_brf(*columns, **OPTIONS), rtol=1e-12)
+
+
+@pytest.mark.parametrize("size", [5, 64, 3000])
+def test_a_listener_is_told_of_every_column_and_of_what_is_compiled(size):
+    """Of those that are solved twice, twice."""
+
+    class Listener:
+        def __init__(self):
+            self.columns, self.compiled = [], []
+
+        def solved(self, columns):
+            self.columns.append(columns)
+
+        def compiling(self, begins):
+            self.compiled.append(begins)
+
+    heard, later = Listener(), Listener()
+    call = (
+        lambda x: jnp.asarray(x[0]),
+        f"told of {size}",
+        [np.arange(1.0 * size)],
+        [True],
+        (size,),
+    )
+    with listening(heard):
+        map_chunks(*call, WIDTHS)
+    with listening(later):
+        map_chunks(*call, WIDTHS)
+    map_chunks(*call, WIDTHS)
+    assert size <= sum(heard.columns) < size + 64 and len(heard.columns) == len(later.columns)
+    assert set(heard.compiled) == {True, False} and later.compiled == []

@@ -1,6 +1,7 @@
 """The command line, on the demonstration's files and on broken ones."""
 
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from abi_operator import cli, scene, simulation
+from abi_operator import __version__, cli, scene, simulation
 from abi_operator.demo import write_demo
 from abi_operator.files import InputError, read_result
 from abi_operator.nomenclature import QUALITY_FLAGS
@@ -57,7 +58,7 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
     picture = "natural_color_2007-10-23T180000.png"
     assert sorted(path.name for path in out.iterdir()) == ["inputs", picture, "result.nc"]
     assert f"wrote {out / 'result.nc'}" in outcome.output
-    assert "64 pixels; flagged: none" in outcome.output
+    assert "64 pixels; flagged: outside_fit 1" in outcome.output
     assert f"computed on {usable_cores()} core" in outcome.output
     with read_result(out / "result.nc") as result:
         assert result.sizes["time"] == 1 and result.sizes["band"] == 4
@@ -67,6 +68,25 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
         assert "US Standard Atmosphere 1976" in result.attrs["air_above_model"]
     with Image.open(out / picture) as image:
         assert image.size == (512, 512)
+
+
+def test_droplet_numbers_can_be_chosen(invoke, tmp_path, inputs):
+    options = ["--ocean-albedo", 0.03, "--bands", "C01", "--num-streams", 2]
+    options += ["--albedo", inputs.albedo, "--droplet-number"]
+    depths = []
+    for number in ("250", "250,500"):
+        out = tmp_path / number
+        outcome = invoke("simulate", inputs.wrf, *options, number, "--out", out)
+        assert outcome.exit_code == 0, outcome.output
+        with read_result(out / "result.nc") as result:
+            depths.append(result["liquid_optical_depth"].values)
+    said = "250 cm-3 over water, 500 cm-3 over land (as asked for)"
+    assert f"droplet number, assumed: {said}" in outcome.output
+    thick = depths[0] > 1
+    ratio = depths[1][thick] / depths[0][thick]
+    assert np.all((abs(ratio - 1) < 0.01) | (abs(ratio - 2 ** (1 / 3)) < 0.03))
+    outcome = invoke("simulate", inputs.wrf, *options, "1e8", "--out", tmp_path / "no")
+    assert outcome.exit_code == 2 and "at most 10000 cm-3" in outcome.stderr
 
 
 def test_a_result_is_all_that_the_operator_needs(invoke, tmp_path):
@@ -102,7 +122,7 @@ def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
         assert result["band"].values.tolist() == ["C01", "C06"]
         assert float(result["ash_aod_550"].max()) == pytest.approx(0.5, rel=0.01)
         assert result.attrs["satellite_longitude"] == -137.0
-        land = result["quality_flag"].values == QUALITY_FLAGS["no_albedo"]
+        land = (result["quality_flag"].values & QUALITY_FLAGS["no_albedo"]) > 0
         assert (np.isnan(result["brf"].values).all(axis=1) == land).all()
 
 
@@ -111,6 +131,7 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
     with netCDF4.Dataset(inputs.wrf, "a") as file:
         file["QICE"][0, 20, :3, :3] = 1e-5
         file["QRAIN"][0, 2, 5:, 5:] = 1e-4
+        file["QSNOW"][0, 2, 0, :2] = -1e-9, -2e-9
     options = ["--albedo", inputs.albedo, "--ocean-albedo", 0.03, "--num-streams", 2]
     options += ["--bands", "C04,C07", "--emissivity", "open shrubland", "--satellite", "GOES-18"]
     options += ["--hydrometeors", "ice", "--microphysics", "wsm6", "--time", 0]
@@ -124,12 +145,15 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         "emissivity of the ground in C07: 0.89 (open shrubland) over land, 0.978 over water",
         "temperature of the ground: the model's",
         "not simulated (rain)",
+        "snow mixing ratio below 0, taken as 0: in 2 cells, down to -2e-09 kg kg-1",
     ):
         assert line in outcome.output
     assert sorted(x.name for x in out.iterdir()) == ["C07_2007-10-23T180000.png", "result.nc"]
     with read_result(out / "result.nc") as result:
         assert result.attrs["satellite"] == "GOES-18"
         assert result.attrs["hydrometeors"] == "cloud; ice"
+        assert result.attrs["negative_snow_mixing_ratio_count"] == 2
+        assert result.attrs["smallest_negative_snow_mixing_ratio"] == pytest.approx(-2e-9)
         ice = result["ice_optical_depth"].sel(band="C04").values[0] > 0
         assert ice[:3, :3].all() and ice.sum() == 9
         vapour_hides = result["brf"].sel(band="C04").values[0] < 0.1
@@ -178,6 +202,29 @@ def test_grounds_without_an_albedo_file(invoke, tmp_path, inputs):
     np.testing.assert_allclose(1 - c07, np.where(land & ~snow, 0.86, 0.984), rtol=1e-6)
 
 
+def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
+    later = inputs.wrf.with_name("wrfout_d01_2007-10-23_20-00-00.nc")
+    shutil.copy(inputs.wrf, later)
+    with netCDF4.Dataset(later, "a") as file:
+        file["Times"][0] = np.array(list("2007-10-23_20:00:00"), "S1")
+    options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--gases", "none"]
+    options += ["--bands", "C01,C06", "--out", tmp_path / "out"]
+    for wrf in ([inputs.wrf, later], [inputs.wrf.with_name("wrfout_*")]):
+        outcome = invoke("simulate", *wrf, *options)
+        assert outcome.exit_code == 0, outcome.output
+        with read_result(tmp_path / "out" / "result.nc") as result:
+            hours = np.array(["2007-10-23T18", "2007-10-23T20"], "datetime64[ns]")
+            np.testing.assert_array_equal(result["time"], hours)
+            assert result.attrs["wrf_file"] == f"{inputs.wrf.name}; {later.name}"
+            early, late = result["solar_zenith_angle"].mean(["y", "x"]).values
+            assert late < early
+    outcome = invoke("simulate", *wrf, *options, "--time", "2007-10-23T20:00")
+    assert outcome.exit_code == 0, outcome.output
+    with read_result(tmp_path / "out" / "result.nc") as result:
+        np.testing.assert_array_equal(result["time"], hours[1:])
+        assert result.attrs["wrf_file"] == later.name
+
+
 def without(path, name):
     """Rename a variable of a file, so that it has no `name`."""
     with netCDF4.Dataset(path, "a") as file:
@@ -188,6 +235,12 @@ def shift(path, degrees):
     """Move an albedo file to the east."""
     with netCDF4.Dataset(path, "a") as file:
         file["lon"][:] += degrees
+
+
+def fill(path, name, value):
+    """Put a value into all places of a variable."""
+    with netCDF4.Dataset(path, "a") as file:
+        file[name][:] = value
 
 
 def shrink(path):
@@ -202,6 +255,11 @@ def shrink(path):
         (lambda inputs: inputs.albedo.unlink(), "does not exist"),
         (lambda inputs: inputs.plume.unlink(), "does not exist"),
         (lambda inputs: inputs.wrf.write_text("no NetCDF"), "cannot be read as NetCDF"),
+        (lambda inputs: os.truncate(inputs.wrf, 100_000), "ends after 100000 of the "),
+        (lambda inputs: os.truncate(inputs.albedo, 90_000), "ends after 90000 of the "),
+        (lambda inputs: inputs.albedo.write_bytes(b"\x0e\x03\x13\x01"), "is an HDF4 file, not N"),
+        (lambda inputs: fill(inputs.wrf, "TSK", 9.96921e36), "was never written"),
+        (lambda inputs: fill(inputs.wrf, "QCLOUD", 1e20), "plausible is 0 to 0.03 kg kg-1"),
         (lambda inputs: without(inputs.wrf, "QCLOUD"), "has no QCLOUD"),
         (
             lambda inputs: without(inputs.albedo, "BRDF_Albedo_Parameters_Band3"),
@@ -240,6 +298,18 @@ def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monk
     assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
 
 
+def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_path, inputs):
+    out = tmp_path / "out"
+    options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--gases", "none", "--out", out]
+    first = invoke("simulate", inputs.wrf, "--bands", "C07", "--emissivity", "water", *options)
+    assert first.exit_code == 0, first.output
+    (out / "C07_mine.png").touch()
+    outcome = invoke("simulate", inputs.wrf, "--bands", "C01, C06", *options)
+    picture = "C07_2007-10-23T180000.png"
+    assert f"removed {out / picture}, a picture of the result before\n" in outcome.stdout
+    assert sorted(path.name for path in out.iterdir()) == ["C07_mine.png", "result.nc"]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -252,7 +322,9 @@ def test_trouble_on_the_way_leaves_nothing_behind(invoke, tmp_path, inputs, monk
         (["--bands", "all"], "C07 needs the emissivity of the ground"),
         (["--bands", "C04", "--satellite", "GOES-19"], "is not known of GOES-19"),
         (["--ocean-albedo", "0.1", "--time", "1"], "has 1 times; ask for one of them"),
+        (["--ocean-albedo", "0.1", "--time", "2005-08-28"], "has no time 2005-08-28; it has"),
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
+        (["--satellite-longitude", "90"], "; give --satellite GOES-16 or GOES-17 or GOES-18"),
         (["--plume-species", "dust"], "'dust' is not one of"),
     ],
 )
@@ -297,6 +369,19 @@ def test_every_command_may_keep_what_it_compiles(monkeypatch, capsys):
     text = capsys.readouterr().out
     assert text.startswith(3 * "float64\n")
     assert str(default_cache_folder()) in text and "--no-cache" in text
+
+
+def test_it_says_its_version_and_helps(invoke, monkeypatch, capsys):
+    assert invoke("--version").stdout == f"abi-operator {__version__}\n"
+    for words in (["-h"], ["simulate", "-h"], ["jacobian", "check", "-h"]):
+        outcome = invoke(*words)
+        assert outcome.exit_code == 0 and outcome.stdout.startswith("Usage: "), outcome.output
+    assert "what other packages add" not in invoke("demo", "-h").stdout
+    monkeypatch.setattr(cli, "_prepare_process", lambda keep_programs: None)
+    monkeypatch.setattr(sys, "argv", ["__main__.py", "simulate", "-h"])
+    with pytest.raises(SystemExit):
+        runpy.run_module("abi_operator", run_name="__main__")
+    assert capsys.readouterr().out.startswith("Usage: python -m abi_operator simulate ")
 
 
 PROCESS = """

@@ -168,3 +168,22 @@ def test_what_was_written_is_read(monkeypatch, tmp_path):
     assert written[0] == written[1] != written[2]
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0], found[2])
+
+
+def test_what_is_kept_has_been_compiled_and_not_read_from_jax(tmp_path):
+    """XLA writes programs that it has read, as after an update of the package, without kernels."""
+    place = tmp_path / "packages"
+    (place / "mine").mkdir(parents=True)
+    (place / "mine" / "__init__.py").touch()
+    (place / "mine" / "work.py").write_text(MINE)
+    caches = {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
+    found = []
+    for name in ("before", "after", "after"):
+        (tmp_path / name).mkdir(exist_ok=True)
+        process = start(
+            tmp_path / name, place, JAX_COMPILATION_CACHE_DIR=str(tmp_path / "jax"), **caches
+        )
+        found.append(finish(process))
+    assert found[0][0] == found[1][0] == found[2][0]
+    assert found[0][1].count("flat_") == found[1][1].count("flat_") == 2
+    assert found[2][1] == "['cholesky']"

@@ -18,16 +18,16 @@ def test_small_pictures_are_enlarged_with_north_at_the_top(tmp_path):
             "Scale": "171 x 171 pixels per column of the scene, nearest neighbour"
         }
         pixels = np.asarray(image)
-    assert (pixels[171:, :171] == [255, 128, 0]).all()
-    assert (pixels[:171, 342:] == 128).all()
-    assert (pixels[:171, :342] == 0).all()
+    assert (pixels[171:, :171] == [255, 128, 0, 255]).all()
+    assert (pixels[:171, 342:] == 0).all()  # transparent, and no grey as of clouds
+    assert (pixels[:171, :342] == [0, 0, 0, 255]).all()
 
 
 def test_large_pictures_keep_their_size(tmp_path):
     write_png(tmp_path / "a.png", np.full((4, 600, 3), 2.0))
     with Image.open(tmp_path / "a.png") as image:
         assert image.size == (600, 4)
-        assert (np.asarray(image) == 255).all()
+        assert image.mode == "RGB" and (np.asarray(image) == 255).all()
 
 
 def test_a_picture_has_three_colours(tmp_path):

@@ -70,6 +70,15 @@ def test_ground_alone_shows_its_albedo():
     np.testing.assert_allclose(solved(state, state), 0.3, rtol=1e-12)
 
 
+def test_a_column_has_all_of_its_air_wherever_its_levels_begin():
+    """From 24 km a twentieth of the air is above; the levels below say how much."""
+    whole = column()
+    cut = eqx.tree_at(
+        lambda s: s.atmosphere.pressure, whole, replace_fn=lambda p: p.at[0].set(5045.0)
+    )
+    np.testing.assert_allclose(*solved(whole, cut), rtol=1e-14)
+
+
 # Neither the first nor in their order: one where droplets absorb and one where air matters.
 TWO = "C06", "C01"
 

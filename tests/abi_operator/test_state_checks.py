@@ -54,6 +54,16 @@ BAD = {
     "plume": (lambda s: s.atmosphere.plumes["smoke"].base, 1, 4000.0,
               r"plumes\['smoke'\], top - base of column 1 is -1000\.0; allowed is above 0"),
     "zenith": (lambda s: s.geometry.view_zenith, 0, -0.1, r"view_zenith of column 0 .* 0 to pi"),
+    "degrees": (lambda s: s.geometry.relative_azimuth, 2, 120.0,
+                r"relative_azimuth of column 2 is 120\.0; allowed is -2 pi to 2 pi"),
+    "hPa": (lambda s: s.atmosphere.pressure, 1, 1013.25 * np.linspace(0, 1, LAYERS + 1),
+            r"pressure at the ground of column 1 is 1013\.25; allowed is 2000 to 120000 Pa"),
+    "km": (lambda s: s.atmosphere.height, 1, np.linspace(24, 0, LAYERS + 1),
+           r"in which pressure falls to 1 / e of column 1 is [89]\.\d+; .* \(height is in m"),
+    "droplets": (lambda s: s.atmosphere.liquid.number_path, 2, 0.0,
+                 r"liquid\.number_path, where there is mass, of entry 11 of column 2 is 0\.0"),
+    "forward": (lambda s: s.atmosphere.plumes["smoke"].asymmetry["C02"], 1, 1.0,
+                r"asymmetry\['C02'\] of column 1 is 1\.0; allowed is above -1 and below 1"),
     "nan": (lambda s: s.geometry.relative_azimuth, 1, np.nan, "azimuth of column 1 is nan"),
 }  # fmt: skip
 
@@ -84,6 +94,66 @@ def test_temperatures_and_fires_are_checked():
     fire = Fire(jnp.asarray(1.5), jnp.asarray(900.0))
     with pytest.raises(ValueError, match=r"fire\.fraction is 1\.5; allowed is 0 to 1"):
         check_state(dataclasses.replace(column(), fire=fire))
+
+
+def with_leaf(read, value, count=2):
+    return eqx.tree_at(read, batch_of(count), value)
+
+
+SHAPES = {
+    "layers": (lambda s: s.atmosphere.liquid.mass_path, np.zeros((2, LAYERS - 1)),
+               r"mass_path has the shape \(11,\) in a column; it needs 12 layers, as pressure"),
+    "levels": (lambda s: s.atmosphere.height, np.zeros((2, LAYERS)),
+               r"height has the shape \(12,\) in a column; it needs 13 levels, as pressure has"),
+    "pressure": (lambda s: s.atmosphere.pressure, np.zeros(2),
+                 r"pressure has shape \(2,\); it needs the 1 axes of the batch and one of two"),
+    "plume": (lambda s: s.atmosphere.plumes["smoke"].base, np.zeros((2, LAYERS)),
+              r"\['smoke'\]\.base has the shape \(12,\) in a column; it needs one number a column"),
+    "list": (lambda s: s.albedo["C01"], [0.1, 0.2],
+             r"state\.albedo\['C01'\] is a list or a tuple; it must be one array"),
+    "tuple": (lambda s: s.atmosphere.pressure, (0.0, 1e5), r"\.atmosphere\.pressure is a list"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SHAPES)
+def test_shapes_are_those_of_the_field(case):
+    read, value, message = SHAPES[case]
+    for function in (brf, quality_flags):
+        with pytest.raises(ValueError, match=message):
+            function(with_leaf(read, value), BANDS)
+
+
+def test_air_may_be_absent():
+    check_state(with_leaf(lambda s: s.atmosphere.pressure, np.zeros((2, LAYERS + 1))))
+
+
+def test_names_are_not_one_string():
+    for function in (brf, reflectance_factor, radiance, quality_flags, outside_fitted_range):
+        with pytest.raises(ValueError, match=r"such as \('C01',\); got the string 'C01'"):
+            function(column(), "C01")
+    with pytest.raises(ValueError, match=r"gases are a sequence .* got the string 'O3'"):
+        brf(column(), BANDS, gases="O3")
+
+
+def test_no_columns_are_an_empty_answer():
+    none = jax.tree.map(lambda x: x[:0], batch_of(1))
+    found = [brf(none, BANDS, **OPTIONS), jax.jit(lambda s: brf(s, BANDS, **OPTIONS))(none)]
+    found += [reflectance_factor(none, BANDS, **OPTIONS), radiance(none, BANDS, **OPTIONS)]
+    assert {x.shape for x in found} == {(0, 2)}
+    slope = jax.grad(lambda s: brf(s, BANDS, num_streams=4).sum())(none)
+    assert slope.atmosphere.pressure.shape == (0, LAYERS + 1)
+    assert quality_flags(none, BANDS).shape == (0,)
+
+
+def test_slopes_of_a_column_that_is_no_number_are_its_own_affair():
+    """Inside a derivative nothing is checked: others are solved as if it were not there."""
+    bad = changed(batch_of(2), lambda s: s.atmosphere.pressure, (1, slice(None)), np.nan)
+
+    def total(state):
+        return jnp.sum(brf(state, BANDS, num_streams=4)[0])
+
+    slopes, expected = (jax.grad(total)(s).albedo["C01"] for s in (bad, batch_of(2)))
+    np.testing.assert_allclose(slopes[0], expected[0], rtol=1e-12)
 
 
 def test_satellites_are_known():

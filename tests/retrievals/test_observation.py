@@ -30,6 +30,7 @@ def test_pixels_are_refused_for_a_reason(simulated):
     image = simulated.copy(deep=True)
     image["reflectance_factor"][1, 0, 0] = np.nan
     image["quality_flag"][0, 1] = QUALITY_FLAGS["grazing_sun"]
+    image["quality_flag"][1, 1] = QUALITY_FLAGS["outside_fit"]  # attempted all the same
     image["smoke_brightness"] = image["smoke_brightness"].copy(deep=True)
     image["smoke_brightness"][0, 2] = 0.0
     codes = usable(image, BANDS, "smoke", "plume")

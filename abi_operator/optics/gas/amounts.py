@@ -47,6 +47,9 @@ class MixedGas(NamedTuple):
     .. math:: \frac{X}{X_0} \left(\frac{p_{k+1}}{p_0}\right)^{1 + n}
        - \frac{X}{X_0} \left(\frac{p_k}{p_0}\right)^{1 + n}, \qquad p_0 = 1013.25\ \mathrm{hPa}
 
+    where :math:`p_k` of the first level counts as 0 (`Atmosphere.counted_pressure`): the gas above
+    it is in the uppermost layer.
+
     Parameters
     ----------
     name
@@ -150,7 +153,7 @@ def amounts_of(atmosphere: Atmosphere, wanted: Sequence[Amount]) -> list[Float[A
 
 
 def _mixed_paths(atmosphere: Atmosphere, amounts: Sequence[MixedGas]) -> Sequence[Array]:
-    relative = atmosphere.pressure / STANDARD_PRESSURE
+    relative = atmosphere.counted_pressure / STANDARD_PRESSURE
     exponent = _column([x.exponent for x in amounts], relative)
     return jnp.unstack(jnp.diff(relative * _power(relative[None], exponent)))
 

@@ -1,11 +1,14 @@
 """Output that is there whole or not at all."""
 
+import errno
 import os
+import re
 import tempfile
 
 import pytest
 
 from abi_operator.files import InputError, output_folder
+from abi_operator.files.abandoned import MARK
 
 
 def test_files_appear_when_the_block_ends(tmp_path):
@@ -74,3 +77,46 @@ def test_a_relative_path_means_where_we_were(tmp_path, monkeypatch):
         (tmp_path / "elsewhere").mkdir()
         os.chdir(tmp_path / "elsewhere")
     assert (tmp_path / "out" / "a").exists()
+
+
+def test_only_folders_that_runs_have_left_are_removed(tmp_path):
+    """Neither those of a run that is alive nor what only looks like one."""
+    (tmp_path / ".out-notes").mkdir()
+    (tmp_path / ".out-of-a-dead-run").mkdir()
+    (tmp_path / ".out-of-a-dead-run" / MARK).touch()
+    with output_folder(tmp_path / "out") as alive, output_folder(tmp_path / "out") as other:
+        (alive / "a").write_text("whole")
+        (other / "b").write_text("whole")
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == [".out-notes", "out"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a", "b"]
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
+def test_a_full_disk_is_said_in_one_sentence(tmp_path, number):
+    words = re.escape(os.strerror(number))
+    with pytest.raises(InputError, match=rf"cannot be written \({words}\) after 0.0 MB, with .*;"):
+        with output_folder(tmp_path / "out") as folder:
+            (folder / "a").write_text("half")
+            raise OSError(number, os.strerror(number))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_trouble_stays_what_it_is(tmp_path):
+    with pytest.raises(RuntimeError, match="^trouble$"), output_folder(tmp_path / "out"):
+        raise RuntimeError("trouble")
+    with pytest.raises(FileNotFoundError), output_folder(tmp_path / "out"):
+        (tmp_path / "nothing").read_text()
+
+
+def test_outdated_files_go_when_new_ones_come(tmp_path):
+    target = tmp_path / "out"
+    target.mkdir()
+    for name in ("a", "b", "c"):
+        (target / name).write_text("old")
+    with pytest.raises(ValueError), output_folder(target, outdated=["a", "b"]):
+        raise ValueError
+    assert len(list(target.iterdir())) == 3
+    with output_folder(target, outdated=["a", "b"]) as folder:
+        (folder / "a").write_text("new")
+    assert {f.name: f.read_text() for f in target.iterdir()} == {"a": "new", "c": "old"}

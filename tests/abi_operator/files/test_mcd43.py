@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 
@@ -105,13 +106,52 @@ def test_times_are_dates_whatever_the_calendar(write_albedo_twin, calendar):
 
 
 def test_missing_bands_are_named_and_the_remedy_too(write_albedo_twin):
-    path = write_albedo_twin({"vis": weights(100)})
+    path = write_albedo_twin({"vis": weights(100), "nir": weights(200)})
     message = (
         "has no BRDF_Albedo_Parameters_Band3, BRDF_Albedo_Parameters_Band2; "
-        "request these layers of MCD43A1 from AppEEARS, or let broadband"
+        r"request these layers of MCD43A1 from AppEEARS, or let its broadband albedo \(vis, nir\) "
+        r"stand in for them: --broadband \(in Python, broadband=True\)."
     )
     with pytest.raises(InputError, match=message):
         read_mcd43a1(path, ["C01", "C03"])
+
+
+@pytest.mark.parametrize(
+    ("held", "bands"),
+    [
+        (("vis",), ["C01", "C03"]),  # nir, which C03 would need, is not there
+        (("shortwave",), ["C01"]),
+        (("Band4",), ["C01"]),
+        (("vis", "nir"), ["C01", "C06"]),  # nothing stands in for C06
+    ],
+)
+def test_broadband_is_suggested_only_where_it_helps(write_albedo_twin, held, bands):
+    path = write_albedo_twin(dict.fromkeys(held, weights(100)))
+    with pytest.raises(InputError, match="request these layers of MCD43A1 from AppEEARS.$"):
+        read_mcd43a1(path, bands)
+
+
+def test_a_latitude_that_is_none_is_refused(write_albedo_twin):
+    path = write_albedo_twin({"Band3": weights(100)}, latitude=(34.0, -999.0))
+    with pytest.raises(InputError, match="lat in .* is -999 degrees_north at lat=1 .* -90 to 90"):
+        read_mcd43a1(path, ["C01"])
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_the_projection_of_modis_itself_is_called_by_name(tmp_path, named):
+    path = tmp_path / "MCD43A1.nc"
+    with netCDF4.Dataset(path, "w") as file:
+        for dim in ("time", "YDim", "XDim", "Num_Parameters"):
+            file.createDimension(dim, 3)
+        for name in ("YDim", "XDim"):
+            file.createVariable(name, "f8", (name,))[:] = 463.3 * np.arange(3)
+        file.createVariable("lat", "f8", ("YDim", "XDim"))[:] = 40.0
+        if named:
+            file.createVariable("crs", "i1").grid_mapping_name = "sinusoidal"
+    message = "MCD43A1.nc is in sinusoidal projection; request .* with the projection Geographic"
+    for read, name in ((read_mcd43a1, "C01"), (read_white_sky, "Band3")):
+        with pytest.raises(InputError, match=message):
+            read(path, [name])
 
 
 def test_broadband_stands_in_with_a_warning(write_albedo_twin):

@@ -82,5 +82,5 @@ def test_what_is_no_picture_is_refused(tmp_path):
 def test_half_a_picture_is_refused(save):
     path = save(np.random.default_rng(0).integers(0, 256, (64, 64), np.uint8))
     path.write_bytes(path.read_bytes()[:2000])
-    with pytest.raises(InputError, match="plume.png cannot be read as a picture"):
+    with pytest.raises(InputError, match="plume.png cannot be read as a picture .*; copy it again"):
         read_plume(path, (64, 64))

@@ -1,11 +1,20 @@
 """Writing a result block by block and reading it back."""
 
+import resource
+
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
-from abi_operator.files import InputError, ResultWriter, read_result
+from abi_operator.files import (
+    InputError,
+    ResultWriter,
+    note_files,
+    noted_files,
+    output_folder,
+    read_result,
+)
 from abi_operator.nomenclature import QUALITY_FLAGS, SCENARIO
 
 TIMES = np.array(["2007-10-23T18:00:00", "2007-10-23T18:30:00.5"], "datetime64[ns]")
@@ -150,3 +159,41 @@ def test_results_without_their_variables_are_refused(path, tmp_path):
         read_result(tmp_path / "less.nc")
     with pytest.raises(InputError, match="absent.nc does not exist"):
         read_result(tmp_path / "absent.nc")
+
+
+@pytest.fixture
+def no_large_files():
+    """Files end after 8 kB, as on a disk that is full."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, limits[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_a_full_disk_is_said_in_one_sentence(tmp_path, results, no_large_files):
+    with pytest.raises(
+        InputError, match=r"out cannot be written \(NetCDF: .*\) after .*; make room"
+    ):
+        with output_folder(tmp_path / "out") as folder:
+            with ResultWriter(folder / "result.nc", times=TIMES, shape=SHAPE) as writer:
+                write_all(writer, results)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_result_that_is_closed_can_be_written_to(path):
+    with read_result(path) as result:
+        assert result["brf"].values.size
+    with netCDF4.Dataset(path, "a") as file:
+        file.note = "HDF5 refuses this where the file is still open"
+
+
+def test_files_that_were_made_of_a_result_are_known(path, tmp_path):
+    assert noted_files(path) == []
+    (tmp_path / "a.png").touch()
+    note_files(path, ["a.png", "gone.png", "../a.png"])
+    assert noted_files(path) == ["a.png"]
+    with netCDF4.Dataset(path, "a") as file:
+        file.source = "another program"
+    assert noted_files(path) == noted_files(tmp_path / "nothing.nc") == []
+    path.write_text("no NetCDF")
+    assert noted_files(path) == []

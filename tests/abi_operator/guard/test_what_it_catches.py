@@ -60,7 +60,7 @@ BY_DERIVATIVE = dict.fromkeys(("smoke", "ash", TABLE, "sign of a derivative"), D
 def factors_of(atmosphere):
     """Factors by fault, in the state that a producer is given."""
     carrier = atmosphere.hydrometeors[FACTORS]
-    numbers = jnp.concatenate([carrier.mass_path, carrier.number_path])
+    numbers = jnp.concatenate([carrier.mass_path, carrier.number_path - 1])
     return {name: numbers[k] for k, name in enumerate((*SCALED, *OTHERS))}
 
 
@@ -120,8 +120,9 @@ def carrying(state, fault=None):
     numbers = [SIZES[name] if name == fault else 0.0 for name in (*SCALED, *OTHERS)]
     num_layers = state.atmosphere.height.shape[0] - 1
     numbers = np.pad(numbers, (0, 2 * num_layers - len(numbers)))
+    # Where there is mass there must be a number, so numbers begin at 1.
     state.atmosphere.hydrometeors[FACTORS] = Hydrometeor(
-        jnp.asarray(numbers[:num_layers]), jnp.asarray(numbers[num_layers:])
+        jnp.asarray(numbers[:num_layers]), jnp.asarray(1 + numbers[num_layers:])
     )
     return state
 

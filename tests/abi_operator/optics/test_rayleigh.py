@@ -1,10 +1,13 @@
 """Rayleigh scattering against its own formula and against the pressure of the column."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from abi_operator.atmosphere import LiquidCloud
 from abi_operator.bands import BANDS, Band
 from abi_operator.constants import STANDARD_PRESSURE
 from abi_operator.optics import rayleigh
@@ -103,7 +106,7 @@ def test_beta2_has_the_depolarisation_of_the_king_factor(band):
 def test_depth_is_proportional_to_the_mass_of_air(make_atmosphere, band):
     atmosphere = make_atmosphere()
     optics = rayleigh(atmosphere, BANDS[band])
-    pressure = atmosphere.pressure[-1] - atmosphere.pressure[0]
+    pressure = atmosphere.pressure[-1]
     np.testing.assert_allclose(
         optics.tau.sum(), STANDARD_DEPTH[band] * pressure / STANDARD_PRESSURE, rtol=1e-13
     )
@@ -112,6 +115,24 @@ def test_depth_is_proportional_to_the_mass_of_air(make_atmosphere, band):
     np.testing.assert_array_equal(optics.weight, [1])
     expected = np.tile([1, 0, BETA2[band] / 5, 0], (10, 1))
     np.testing.assert_allclose(optics.moments(4), expected, rtol=1e-15)
+
+
+def test_air_above_the_first_level_counts(make_atmosphere):
+    """In the uppermost layer, wherever levels begin; that level's own pressure moves nothing."""
+    whole = make_atmosphere()
+    assert whole.pressure[0] > 1000  # there is air above
+    cut = dataclasses.replace(
+        whole,
+        pressure=whole.pressure[3:],
+        height=whole.height[3:],
+        liquid=LiquidCloud(whole.liquid.mass_path[3:], whole.liquid.number_path[3:]),
+    )
+    depth, of_rest = (rayleigh(a, BANDS["C01"]).tau[0] for a in (whole, cut))
+    np.testing.assert_allclose(of_rest[0], depth[:4].sum(), rtol=1e-13)
+    np.testing.assert_allclose(of_rest[1:], depth[4:], rtol=1e-13)
+    slope = jax.jacrev(lambda a: rayleigh(a, BANDS["C01"]).tau[0])(whole).pressure
+    per_pascal = STANDARD_DEPTH["C01"] / STANDARD_PRESSURE
+    np.testing.assert_allclose(slope[0], per_pascal * np.eye(11)[1], rtol=1e-13)
 
 
 def test_wavelength_and_pressure_differentiate(make_atmosphere):

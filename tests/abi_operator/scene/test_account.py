@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from abi_operator.scene import add_accounts
-from abi_operator.scene.account import condensate_account
+from abi_operator.scene import add_accounts, negative_lines
+from abi_operator.scene.account import condensate_account, negative_account
 from abi_operator.scene.condensate import Condensate
+from abi_operator.scene.droplet_number import assumed_droplets
 from abi_operator.scene.hydrometeors import Hydrometeors, Paths
 
 
@@ -23,10 +24,13 @@ def test_blocks_add_up():
     }
 
 
+WSM6 = assumed_droplets(None, "wsm6")
+
+
 def account(total, left_out, num_assumed=0):
     nothing = np.zeros(1)
     paths = {name: Paths(nothing, nothing, num_assumed) for name in ("cloud", "snow")}
-    return condensate_account(Hydrometeors(paths, Condensate(total, left_out), "wsm6"))
+    return condensate_account(Hydrometeors(paths, Condensate(total, left_out), "wsm6", WSM6))
 
 
 def test_shares_and_assumptions_are_those_of_all_blocks():
@@ -38,3 +42,21 @@ def test_shares_and_assumptions_are_those_of_all_blocks():
     assert scene["unsimulated_condensate"] == "rain; hail"
     assert scene["hydrometeors"] == "cloud; snow" and scene["microphysics"] == "wsm6"
     assert scene["assumed_snow_number_count"] == 5
+
+
+def test_small_negative_numbers_are_told_of_the_whole_scene(make_model):
+    blocks = []
+    for count, smallest in ((3, -7e-14), (0, None), (4, -2e-6)):
+        model = make_model(rain_mixing_ratio=0)
+        attributes = {"num_negative_set_to_zero": count, "smallest_negative": smallest}
+        model["rain_mixing_ratio"].attrs = {k: v for k, v in attributes.items() if v is not None}
+        blocks.append(negative_account(model))
+    assert blocks[1] == {}
+    scene = add_accounts(blocks)
+    assert scene == {
+        "negative_rain_mixing_ratio_count": 7,
+        "smallest_negative_rain_mixing_ratio": -2e-6,
+    }
+    lines = list(negative_lines(scene))
+    assert lines == ["rain mixing ratio below 0, taken as 0: in 7 cells, down to -2e-06 kg kg-1"]
+    assert list(negative_lines({})) == []

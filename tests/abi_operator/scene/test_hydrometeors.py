@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 
 
 def paths(model, droplet_number=None, **options):
-    return hydrometeor_paths(model, droplet_number or DropletNumber(), **options)
+    return hydrometeor_paths(model, droplet_number, **options)
 
 
 def thickness(model):
@@ -62,7 +62,7 @@ def test_droplet_number_is_assumed_where_the_model_has_mass_without(make_model):
     [
         (1.0, 300e6, "100 cm-3 over water, 300 cm-3 over land"),
         (0.0, 100e6, "100 cm-3 over water, 300 cm-3 over land"),
-        (None, 150e6, "150 cm-3"),
+        (None, 150e6, "150 cm-3 over water and land alike, as the model has no land mask"),
     ],
 )
 def test_assumed_droplet_number_depends_on_the_ground(make_model, land_mask, number, text):
@@ -73,6 +73,48 @@ def test_assumed_droplet_number_depends_on_the_ground(make_model, land_mask, num
     assert (cloud.number[cloud.mass == 0] == 0).all()
     assert cloud.num_assumed == 3
     assert assumed.describe(model) == text
+
+
+@pytest.mark.parametrize(
+    ("scheme", "over_water", "over_land", "source"),
+    [
+        ("thompson", 100e6, 100e6, "as the microphysics thompson does"),
+        ("morrison", 250e6, 250e6, "as the microphysics morrison does"),
+        ("wsm6", 300e6, 300e6, "as the microphysics wsm6 does"),
+        # Neither assumes a number: the one needs none, of the other nothing is known.
+        ("kessler", 100e6, 300e6, "typical of stratiform cloud; the microphysics kessler assumes"),
+        ("p3", 100e6, 300e6, "typical of stratiform cloud; the microphysics p3 assumes none"),
+    ],
+)
+def test_the_schemes_own_droplet_number_comes_first(
+    make_model, scheme, over_water, over_land, source
+):
+    for land_mask, number in ((0.0, over_water), (1.0, over_land)):
+        model = make_model(land_mask=land_mask).assign_attrs(microphysics_scheme=scheme)
+        found = paths(model)
+        np.testing.assert_allclose(
+            found.paths["cloud"].number[-2, :, 0], number * 700.0, rtol=ROUNDING
+        )
+        assert found.droplets.source.startswith(source)
+    chosen = paths(model, DropletNumber.from_text("50,70"))
+    np.testing.assert_allclose(chosen.paths["cloud"].number[-2, :, 0], 7e7 * 700.0, rtol=ROUNDING)
+    assert chosen.droplets.source == "as asked for"
+    assert chosen.droplets.number.describe(model) == "50 cm-3 over water, 70 cm-3 over land"
+
+
+def test_numbers_of_droplets_from_text(make_model):
+    assert DropletNumber.from_text("80") == DropletNumber(80e6, 80e6, 80e6)
+    for text in ("many", "1,2,3", ""):
+        with pytest.raises(InputError, match="is N or WATER,LAND, in droplets per cm3; got "):
+            DropletNumber.from_text(text)
+    for text in ("0", "-5", "1e8", "nan", "100,inf"):
+        with pytest.raises(InputError, match="must be above 0 and at most 10000 cm-3"):
+            DropletNumber.from_text(text)
+    both = DropletNumber.from_text("50,70")
+    with pytest.raises(InputError, match="has no land mask .* not 50 and 70 cm-3"):
+        paths(make_model(land_mask=None), both)
+    same = DropletNumber.from_text("60")
+    assert same.describe(make_model(land_mask=None)) == "60 cm-3"
 
 
 def test_effective_radii_of_the_model_come_before_its_numbers(make_model):

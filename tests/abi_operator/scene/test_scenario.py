@@ -39,6 +39,8 @@ def test_a_scenario_has_the_variables_of_the_nomenclature(make_scenario):
     np.testing.assert_allclose(made["smoke_brightness"], BRIGHTNESS)
     assert made.attrs["num_levels_above_model"] == 8
     assert made.attrs["assumed_droplet_number_count"] == 3
+    assert made.attrs["assumed_droplet_number"] == "250 cm-3"
+    assert made.attrs["assumed_droplet_number_source"] == "as the microphysics morrison does"
     assert made.attrs["model_title"] == "test"
 
 
@@ -154,7 +156,7 @@ def test_plumes_must_have_the_bands(make_scenario):
         ),
         ("pressure", {"level": 9}, 1.0, "pressure is 1 at level=9, .* than in the level above"),
         ("height", {"level": 9}, 9.9e4, "height is 99000 at level=9, .* than in the level above"),
-        ("liquid_mass_path", {"layer": 11}, -1.0, "liquid_mass_path is -1 .* 0 kg m-2 or more"),
+        ("liquid_mass_path", {"layer": 11}, -1.0, "liquid_mass_path is -1 .* 0 to 10000 kg m-2"),
         (
             "liquid_mass_path",
             {"layer": 11},
@@ -177,7 +179,9 @@ def test_plumes_must_have_the_bands(make_scenario):
             "temperature is 20 at level=9, .* must be 100 to 500 K",
         ),
         ("vapour", {"layer": 11}, -1.0, "vapour is -1 at layer=11, .* 0 kg m-2 or more"),
-        ("latitude", {}, np.nan, "latitude is nan at y=6, x=1; it must be finite"),
+        ("latitude", {}, np.nan, "latitude is nan at y=6, x=1; it must be -90 to 90"),
+        ("latitude", {}, -999.0, "latitude is -999 at y=6, x=1; it must be -90 to 90 degrees"),
+        ("liquid_mass_path", {"layer": 11}, 1e20, "liquid_mass_path is 1e.20 .* 0 to 10000 kg m-2"),
     ],
 )
 def test_values_are_checked_and_named(make_scenario, name, place, value, message):
@@ -207,3 +211,12 @@ def test_missing_albedo_is_no_error_where_it_is_flagged(make_scenario, make_mode
     made = make_scenario(make_model())
     assert np.isnan(made["surface_albedo"]).any()
     check_scenario(made)
+
+
+def test_small_negative_numbers_of_the_model_are_told(make_scenario, make_model):
+    model = make_model()
+    told = {"num_negative_set_to_zero": 2, "smallest_negative": -1e-9}
+    model["vapour_mixing_ratio"].attrs |= told
+    made = make_scenario(model)
+    assert made.attrs["negative_vapour_mixing_ratio_count"] == 2
+    assert made.attrs["smallest_negative_vapour_mixing_ratio"] == -1e-9

@@ -1,11 +1,19 @@
 """Simulated scenes: what they contain, where they are undefined, and how they are cut."""
 
+import io
+import sys
+
 import numpy as np
 import pytest
 
-from abi_operator import brf, radiance, smoke
+from abi_operator import brf, quality_flags, radiance, smoke
 from abi_operator.files import InputError
-from abi_operator.nomenclature import OPTIONAL_RESULT, QUALITY_FLAGS, RESULT
+from abi_operator.nomenclature import (
+    LARGEST_SHARE_OUTSIDE,
+    OPTIONAL_RESULT,
+    QUALITY_FLAGS,
+    RESULT,
+)
 from abi_operator.satellites import solar_irradiance
 from abi_operator.scene import (
     PlumeSpecification,
@@ -82,6 +90,22 @@ def test_flagged_pixels_are_not_solved(made):
         np.testing.assert_allclose(factor, [[0, nan], [nan, solved], [nan, 0]], rtol=ROUNDING)
         value = result["brf"].values[band]
         assert np.isfinite(value).tolist() == [[False, False], [False, True], [False, False]]
+
+
+def test_flags_of_a_scene_are_those_of_its_states(make_model):
+    """Crystals far smaller than any fit covers, in one column of a scene and of its states."""
+    model = make_model(land_mask=None, ice_mixing_ratio=1e-5, ice_effective_radius=3e-5)
+    model["ice_effective_radius"][:, 1, 1] = 2e-6
+    made = scenario(model, ocean_albedo=0.06, bands=("C01", "C03"))
+    result = simulate(made, **OPTIONS)
+    flags = result["quality_flag"].values
+    assert flags.dtype == np.uint8
+    outside = (flags & QUALITY_FLAGS["outside_fit"]) > 0
+    assert outside.tolist() == [[False, False], [False, True], [False, False]]
+    share = result["outside_fitted_range"].values.max(axis=0)
+    np.testing.assert_array_equal(outside, share > LARGEST_SHARE_OUTSIDE)
+    states = column_states(made, ("C01", "C03"))
+    np.testing.assert_array_equal(flags.ravel(), quality_flags(states, ("C01", "C03")))
 
 
 def test_a_scene_by_night_is_dark(make_model):
@@ -168,6 +192,32 @@ def test_a_run_goes_through_all_times_and_rows(made):
         assert result["time"] == times[time_index]
         part = whole.isel(y=slice(start, start + 2))
         np.testing.assert_allclose(result["brf"], part["brf"], rtol=ROUNDING)
+
+
+def test_a_listener_hears_of_columns_as_they_are_solved(made):
+    class Listener:
+        columns = 0
+
+        def solved(self, columns):
+            self.columns += columns
+
+        def compiling(self, begins):
+            pass
+
+    listener = Listener()
+    night = made.assign(quality_flag=made["quality_flag"].copy())
+    night["quality_flag"][0] |= QUALITY_FLAGS["night"]
+    simulate(night, listener=listener, **OPTIONS)
+    assert listener.columns == 4
+
+
+def test_a_run_shows_how_far_it_is(made, monkeypatch):
+    terminal = io.StringIO()
+    monkeypatch.setattr(terminal, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    times, options = made["time"].values[None], {"block_columns": 4} | OPTIONS
+    run(lambda _, rows: made.isel(y=rows), times, (3, 2), lambda *_: None, **options)
+    assert " 0/6 " in terminal.getvalue() and " 6/6 " in terminal.getvalue()
 
 
 def test_blocks_of_rows_cover_a_scene():

@@ -1,4 +1,4 @@
-"""What the solver refuses when asked to check values, and in which words."""
+"""What the solver refuses, unasked and when asked to check values, and in which words."""
 
 import re
 
@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from columns import hard_columns, simple_columns
 
-from abi_operator.solver.checks import check_arguments
+from abi_operator.solver import toa_brf, toa_radiance
+from abi_operator.solver.checks import RANGES, check_arguments, check_in_memory
 
 NAMES = ("tau", "ssa", "moments", "albedo", "mu0", "mu", "relative_azimuth")
 
@@ -62,7 +63,8 @@ def test_good_values_pass():
         ("mu0", -0.5, "(0, 1]"),
         ("mu", 0.0, "(0, 1]"),
         ("mu", 1.5, "(0, 1]"),
-        ("relative_azimuth", np.inf, "(-inf, inf)"),
+        ("relative_azimuth", np.inf, "[-6.2832, 6.2832] rad"),
+        ("relative_azimuth", 30.0, "[-6.2832, 6.2832] rad"),
         ("phase_function", -0.5, "[0, inf)"),
         ("secant", 0.0, "(0, inf)"),
         ("secant", np.inf, "(0, inf)"),
@@ -210,3 +212,107 @@ def test_long_enough_series_passes():
         check_arguments(
             arguments(moments=0.86 ** np.arange(64.0) * np.ones((3, 1))), series_summed=True
         )
+
+
+OPTIONS = {"num_streams": 4}
+
+
+def called(**changed):
+    """brf of two columns of three layers, of which some arguments are changed."""
+    return toa_brf(**arguments(**changed), **OPTIONS)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("name", RANGES)
+def test_the_quick_look_lets_pass_what_the_close_one_does(name, dtype):
+    """Numbers about both ends of the range, and those that are no numbers, in a good array."""
+    one = np.asarray(1, dtype)
+    numbers = [-7, -1.5, -1, -0.5, -1e-30, -0.0, 0, 1e-30, 0.5, 1, np.nextafter(one, one + 1), 7]
+    for number in np.asarray([*numbers, np.inf, -np.inf, np.nan, -np.asarray(np.nan)], dtype):
+        x = np.full((4, 3, 6), 0.5, dtype)
+        x[2, 1, 3] = number
+        given = {name: np.ascontiguousarray(x)}
+        try:
+            check_arguments(given, series_summed=False)
+            refused = None
+        except ValueError as error:
+            refused = str(error)
+        for array in (given[name], np.moveaxis(given[name], 0, -1), jnp.asarray(given[name])):
+            try:
+                check_in_memory({name: array})
+                assert refused is None, (name, number)
+            except ValueError as error:
+                assert refused is not None, (name, number, error)
+
+
+def test_calls_check_unasked():
+    bad = {"tau": [1.0, -0.5, 1.0], "ssa": [1.2, 0.9, 0.9], "mu0": [0.5, 1.5], "albedo": 1.5}
+    bad |= {"relative_azimuth": 120.0, "mu": 0.0}
+    for name, value in bad.items():
+        with pytest.raises(ValueError, match=rf"^{name}(\[\d\])? = .* is outside"):
+            called(**{name: np.asarray(value)})
+    with says("solar_irradiance = -1.0 is outside [0, inf)."):
+        toa_radiance(**arguments(), solar_irradiance=-1.0, **OPTIONS)
+    assert np.isfinite(
+        toa_brf(**arguments(ssa=np.full(3, 1.2)), check_values=False, **OPTIONS)
+    ).all()
+
+
+def test_derivatives_and_vmap_check_what_they_read():
+    def total(tau):
+        return called(tau=tau).sum()
+
+    for number in (np.nan, np.inf, -0.5):
+        tau = np.array([1.0, number, 1.0])
+        for function, x in ((jax.grad(total), tau), (jax.vmap(total), tau[None])):
+            with pytest.raises(ValueError, match=rf"^tau\[.*1\] = {number} is outside"):
+                function(x)
+
+
+def test_columns_that_are_not_finite_are_alone_so_unchecked():
+    """Where nobody checks, neither do they settle how the others are solved."""
+    tau = np.array([[1.0, 2.0, 3.0], [1.0, np.nan, 1.0]])
+
+    def total(tau):
+        return jnp.nansum(toa_brf(**arguments(tau=tau), check_values=False, **OPTIONS))
+
+    slopes = jax.grad(total)(tau)
+    alone = jax.grad(total)(np.where(np.isfinite(tau), tau, 1.0))
+    np.testing.assert_allclose(slopes[0], alone[0], rtol=1e-12)
+
+
+def test_slopes_under_jit_of_layers_beyond_any_number_of_doublings_are_nan():
+    """Of that column alone: for so thick a layer what is doubled does not begin thin enough."""
+    columns = simple_columns(count=2, num_layers=3)
+    tau = np.array(columns[0])
+    tau[1, 1] = 1e10
+
+    def brf(tau):
+        return toa_brf(tau, *columns[1:], **OPTIONS)
+
+    found = jax.jit(lambda t: jax.vjp(brf, t)[1](np.ones(2))[0])(tau)
+    np.testing.assert_array_equal(np.isfinite(found).all(axis=1), [True, False])
+    assert np.isnan(found[1]).all()
+    np.testing.assert_allclose(found[0], jax.vjp(brf, np.array(columns[0]))[1](np.ones(2))[0][0])
+
+
+def test_lists_of_what_is_traced_are_arrays_too():
+    slope = jax.grad(lambda a: called(albedo=[a, 0.3]).sum())(0.2)
+    expected = jax.grad(lambda a: called(albedo=a).sum())(np.array([0.2, 0.3]))[0]
+    np.testing.assert_allclose(slope, expected, rtol=1e-12)
+
+
+def test_no_columns_are_an_empty_answer_and_no_layers_an_error():
+    none = arguments(tau=np.zeros((0, 3)), mu0=0.5, mu=0.5, albedo=0.2)
+    none |= {"ssa": np.ones(3), "moments": 0.5 ** np.arange(129) * np.ones((3, 1))}
+    none |= {"relative_azimuth": 0.3}
+
+    def brf(tau):
+        return toa_brf(**none | {"tau": tau}, **OPTIONS)
+
+    tau = np.zeros((0, 3))
+    assert brf(tau).shape == jax.jit(brf)(tau).shape == (0,)
+    for gradient in (jax.grad(lambda t: brf(t).sum()), jax.jit(jax.grad(lambda t: brf(t).sum()))):
+        assert gradient(tau).shape == (0, 3)
+    with says("a column has one layer or more; there is none in tau."):
+        brf(np.zeros((4, 0)))

@@ -99,6 +99,7 @@ def study(rng, columns, num_streams, single_scattering):
             num_streams=num_streams,
             num_doublings=doublings,
             single_scattering=single_scattering,
+            check_values=False,  # differences go beyond the ranges
         )
 
     arrays = [jnp.asarray(x) for x in columns]
@@ -201,6 +202,7 @@ def at_angles(num_streams, single_scattering):
             num_streams=num_streams,
             num_doublings=4,
             single_scattering=single_scattering,
+            check_values=False,
         )
 
     compiled = jax.jit(jax.value_and_grad(brf, argnums=(0, 1, 2, 3)))
