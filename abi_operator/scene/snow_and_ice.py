@@ -28,7 +28,7 @@ _NO_ICE = (
 )
 _BARE = (
     "snow lies on the ground of the model (SNOWC or SNOW in WRF's files; snow_count tells in how "
-    "many columns), and no albedo of it was named: that of the albedo file may be of bare ground, "
+    "many columns), and no albedo of it was named: that of an albedo file may be of bare ground, "
     "and the regressions from MODIS's bands to the imager's do not hold for snow; name one "
     f"(--snow-albedo), a number or {_SNOW_TYPES}."
 )

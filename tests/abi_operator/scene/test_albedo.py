@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from abi_operator.files import InputError
+from abi_operator.files.cell_bounds import cell_bounds
 from abi_operator.scene import check_ground
 from abi_operator.scene.albedo import surface_albedo
 from abi_operator.scene.albedo_file import albedo_of_file
@@ -49,6 +50,21 @@ def test_the_count_of_longitudes_does_not_matter_to_means(make_model, make_albed
     expected, _ = surface_albedo(model, BANDS, albedo, None)
     turned = albedo.assign_coords(lon=albedo.lon + 360)
     np.testing.assert_allclose(surface_albedo(model, BANDS, turned, None)[0], expected, rtol=1e-12)
+
+
+def test_blocks_of_rows_have_the_means_of_the_whole(make_model, make_albedo):
+    """Even rows by themselves, as corners come with the model; rows farther apart northwards."""
+    model, albedo = make_model(), fine_albedo(make_albedo)
+    model["latitude"] += 0.02 * np.arange(3)[:, None] ** 2
+    bounds = cell_bounds(model["latitude"].values, model["longitude"].values)
+    names = "latitude_bounds", "longitude_bounds"
+    corners = {name: (("y", "x", "corner"), x) for name, x in zip(names, bounds, strict=True)}
+    model = model.assign_coords(corners)
+    whole, _ = surface_albedo(model, BANDS, albedo, None)
+    for row in range(3):
+        block, source = surface_albedo(model.isel(y=[row]), BANDS, albedo, None)
+        np.testing.assert_allclose(block, whole[:, [row]], rtol=1e-12)
+        assert source["mean_albedo_count"] == 2
 
 
 def test_means_with_holes_are_counted_and_those_mostly_of_holes_are_none(make_model, make_albedo):
