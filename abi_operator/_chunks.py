@@ -19,45 +19,20 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from threading import Lock
-from typing import Any, Protocol
+from typing import Any
 
 import jax
 import numpy as np
 from jaxtyping import Array
 
 from ._lanes import lanes, parted, threads
+from ._listening import compiling, tell_solved
 from ._processor import usable_cores
 
 _ALIGNMENT = 64  # bytes
 
 # What has been compiled: of several threads with a new program each would compile it.
 _compiled: set[Any] = set()
-
-
-_listener: "Listener | None" = None
-
-
-class Listener(Protocol):
-    """Whoever wants to know how far columns are, which any thread may tell."""
-
-    def compiling(self, begins: bool) -> None:
-        """A program begins to be compiled, or to be read from the disk, or has been."""
-        ...
-
-    def solved(self, columns: int) -> None:
-        """So many columns more have been solved."""
-        ...
-
-
-@contextmanager
-def listening(listener: Listener | None) -> Iterator[None]:
-    """Tell someone of all columns that are solved in this block."""
-    global _listener
-    before, _listener = _listener, listener
-    try:
-        yield
-    finally:
-        _listener = before
 
 
 def can_be_cut(arrays: Sequence[Any]) -> bool:
@@ -109,8 +84,7 @@ def map_chunks(
 
     def finish(chunk: tuple[int, int], found: Any) -> Any:
         jax.block_until_ready(found)
-        if _listener is not None:
-            _listener.solved(min(chunk[1], columns.size - chunk[0]))
+        tell_solved(min(chunk[1], columns.size - chunk[0]))
         return found if whole else results.put(chunk[0], found)
 
     def solve(chunk: tuple[int, int]) -> Any:
@@ -210,7 +184,7 @@ class _Columns:
         known = self.known(width)
         # Settings of the caller's thread, not of this one.
         settings = jax.enable_x64(self._x64), jax.default_device(self._device)
-        with settings[0], settings[1], nullcontext() if known else _compiling():
+        with settings[0], settings[1], nullcontext() if known else _first_call():
             found = self._function(some)
         if not known:
             _compiled.add((*self._key, width))
@@ -250,17 +224,10 @@ def _first_of_each(chunks: list[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 @contextmanager
-def _compiling() -> Iterator[None]:
-    """Say so, and compile undisturbed."""
-    listener = _listener
-    if listener is not None:
-        listener.compiling(True)
-    try:
-        with _no_search_for_garbage():
-            yield
-    finally:
-        if listener is not None:
-            listener.compiling(False)
+def _first_call() -> Iterator[None]:
+    """A call that compiles, or reads a program from the disk."""
+    with compiling(), _no_search_for_garbage():
+        yield
 
 
 @contextmanager

@@ -30,6 +30,7 @@ FLOORS = [
         "_batching",
         "_ending",
         "_kernels",
+        "_listening",
         "_processor",
         "_slopes",
         "_numerics",

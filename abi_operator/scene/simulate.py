@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from .._chunks import Listener, listening, map_chunks
+from .._chunks import map_chunks
+from .._listening import Listener, listening
 from ..atmosphere import Atmosphere, State
 from ..bands import BANDS, check_bands
 from ..files import InputError

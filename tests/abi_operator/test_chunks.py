@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator._chunks import begin_chunks, cut, listening, map_chunks
+from abi_operator._chunks import begin_chunks, cut, map_chunks
+from abi_operator._listening import listening
 from abi_operator.solver import toa_brf
 
 WIDTHS = 8, 64, 512

@@ -380,7 +380,8 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
     outcome = invoke("simulate", inputs.wrf, "--bands", "C01, C06", *options)
     picture = "C07_2007-10-23T180000.png"
     assert f"removed {out / picture}, a picture of the result before\n" in outcome.stdout
-    assert sorted(path.name for path in out.iterdir()) == ["C07_mine.png", "result.nc"]
+    now = [f"{band}_2007-10-23T180000.png" for band in ("C01", "C06")]
+    assert sorted(path.name for path in out.iterdir()) == [*now, "C07_mine.png", "result.nc"]
 
 
 @pytest.mark.parametrize(
