@@ -71,11 +71,9 @@ PLAUSIBLE: dict[str, Range] = {
     "surface_emissivity": Range(0, 1),
     "land_mask": Range(0, 1),
     "broadband_albedo": Range(0, 1),
-    "land_use": Range(0, 255),  # numbers of categories; the longest table has 61
+    "land_use": Range(0, 255),  # of one byte in the files that models take it from
     "sea_ice": Range(0, 1),
     "snow_cover": Range(0, 1),
-    "broadband_albedo": Range(0, 1),
-    "land_use": Range(0, 255),  # of one byte in the files that models take it from
     "snow_mass": Range(0, 1e5),  # ice sheets, where a model does not stop counting before
     # A dew point of 43 degrees C at 1000 hPa; the highest observed, in Dhahran on 8 July 2003, is
     # 35, which is 0.037 kg kg-1.
