@@ -4,7 +4,7 @@ import glob
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -118,14 +118,16 @@ def open_wrf_series(wrf: FilePath | Sequence[FilePath]) -> WrfSeries:
     """
     paths = _files([wrf] if isinstance(wrf, str | PathLike) else wrf)
     first, moving = wrf_coordinates(paths[0]), False
+    common = described = _described(paths[0])
     places, moments = [], []
     for path in paths:
         own = first
         if path is not paths[0]:
-            _check_alike(paths[0], path)
+            described = _described(path)
+            _check_alike(paths[0], common, path, described)
             own = wrf_coordinates(path)
         if not all(np.array_equal(first[x], own[x]) for x in ("latitude", "longitude")):
-            if not _may_move(path):
+            if int(described["GRID_ID"] or 1) == 1:  # the outermost domain, which does not move
                 raise InputError(
                     f"{path} is of another place than {paths[0]}; give files of one domain."
                 )
@@ -160,23 +162,18 @@ def _files(given: Sequence[FilePath]) -> list[Path]:
     return list(dict.fromkeys(paths))
 
 
-def _check_alike(first: Path, other: Path) -> None:
-    """Raise `InputError` where two files are not of one grid of one run."""
-    known = []
-    for path in (first, other):
-        with open_netcdf(path) as file:
-            sizes = {name: file.sizes.get(name) for name in _DIMENSIONS}
-            known.append(sizes | {name: file.attrs.get(name) for name in _ATTRIBUTES})
-    for name in known[0]:
-        one, two = (each[name] for each in known)
-        if one is not None and two is not None and one != two:
-            raise InputError(
-                f"{name} is {two} in {other} and {one} in {first}; give files of one domain of "
-                "one run."
-            )
-
-
-def _may_move(path: Path) -> bool:
-    """Whether a file is of a nest; the outermost domain, number 1, does not move."""
+def _described(path: Path) -> dict[str, Any]:
+    """What files of one grid of one run have in common; None for what a file does not say."""
     with open_netcdf(path) as file:
-        return int(file.attrs.get("GRID_ID", 1)) > 1
+        sizes = {name: file.sizes.get(name) for name in _DIMENSIONS}
+        return sizes | {name: file.attrs.get(name) for name in _ATTRIBUTES}
+
+
+def _check_alike(first: Path, one: dict[str, Any], other: Path, two: dict[str, Any]) -> None:
+    """Raise `InputError` where two files are not of one grid of one run."""
+    for name in one:
+        if one[name] is not None and two[name] is not None and one[name] != two[name]:
+            raise InputError(
+                f"{name} is {two[name]} in {other} and {one[name]} in {first}; give files of one "
+                "domain of one run."
+            )
