@@ -1,7 +1,6 @@
 """The command line, on the demonstration's files and on broken ones."""
 
 import os
-import runpy
 import shutil
 import subprocess
 import sys
@@ -446,17 +445,15 @@ def test_every_command_may_keep_what_it_compiles(monkeypatch, capsys):
     assert str(default_cache_folder()) in text and "--no-cache" in text
 
 
-def test_it_says_its_version_and_helps(invoke, monkeypatch, capsys):
+def test_it_says_its_version_and_helps(invoke):
     assert invoke("--version").stdout == f"abi-operator {__version__}\n"
     for words in (["-h"], ["simulate", "-h"], ["jacobian", "check", "-h"]):
         outcome = invoke(*words)
         assert outcome.exit_code == 0 and outcome.stdout.startswith("Usage: "), outcome.output
     assert "what other packages add" not in invoke("demo", "-h").stdout
-    monkeypatch.setattr(cli, "_prepare_process", lambda keep_programs: None)
-    monkeypatch.setattr(sys, "argv", ["__main__.py", "simulate", "-h"])
-    with pytest.raises(SystemExit):
-        runpy.run_module("abi_operator", run_name="__main__")
-    assert capsys.readouterr().out.startswith("Usage: python -m abi_operator simulate ")
+    words = [sys.executable, "-P", "-m", "abi_operator", "simulate", "-h"]
+    found = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert found.stdout.startswith("Usage: python -m abi_operator simulate ")
 
 
 PROCESS = """

@@ -15,6 +15,9 @@ from abi_operator.files import output_folder
 
 ROOT = Path(__file__).parents[2]
 
+# Where tests run in the background SIGINT is ignored, and by their children, too.
+HEARING = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+
 # Takes hours in C, where Python does not look for signals, as compiling does.
 BUSY = 'hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)'
 
@@ -64,7 +67,7 @@ def begun(code, folder, path=()):
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
     environment.pop("JAX_COMPILATION_CACHE_DIR", None)
     with subprocess.Popen(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", HEARING + code],
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,

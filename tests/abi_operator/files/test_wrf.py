@@ -290,7 +290,7 @@ def test_real_file_with_a_cut_column_and_a_moving_nest(sample_data: Path):
     num_negative_rain = 0
     for time in range(4):
         dataset = read_wrf(path, time, slice(0, 48))
-        assert dataset.sizes == {"layer": 14, "level": 15, "y": 48, "x": 48}
+        assert dataset.sizes == {"layer": 14, "level": 15, "y": 48, "x": 48, "corner": 4}
         assert 48e3 < dataset["layer_pressure"].min() < 54e3
         assert dataset["layer_pressure"].max() < dataset["surface_pressure"].max() < 103e3
         assert 255 < dataset["layer_temperature"].min() < dataset["layer_temperature"].max() < 310
