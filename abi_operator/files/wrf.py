@@ -15,13 +15,14 @@ from .netcdf import (
     FilePath,
     cf_attributes,
     load,
-    load_finite,
     open_netcdf,
     require_dims,
     require_variables,
 )
 from .plausible import plausible, without_traces
 from .projection import projection_attributes
+from .wrf_run import ADVICE, moves, run_attributes, times_of
+from .wrf_run import SCHEMES as SCHEMES
 from .wrf_values import DIMENSIONS, SUMS, check_block, check_stated_units
 
 VARIABLE_MAP = {
@@ -65,30 +66,6 @@ VARIABLE_MAP = {
 
 REQUIRED = ("P", "PB", "PH", "PHB", "T", "QVAPOR", "QCLOUD", "XLAT", "XLONG")
 
-SCHEMES: dict[int, str] = {
-    1: "kessler",
-    2: "lin",
-    3: "wsm3",
-    4: "wsm5",
-    6: "wsm6",
-    7: "goddard",
-    8: "thompson",
-    9: "milbrandt",
-    10: "morrison",
-    14: "wdm5",
-    16: "wdm6",
-    17: "nssl",
-    18: "nssl",
-    22: "nssl",
-    28: "thompson",  # aware of aerosol, which adds the number of droplets
-    40: "morrison",  # likewise
-    50: "p3",
-    51: "p3",
-    52: "p3",
-    55: "ishmael",
-}
-"""MP_PHYSICS, WRF's number of a microphysics scheme: its name. (Registry.EM_COMMON of WRF)"""
-
 # Potential temperature is stored less this, whatever the file's T00. [K]
 _THETA_OFFSET = 300.0
 # Pressure at which temperature and potential temperature agree. [Pa]
@@ -108,7 +85,6 @@ _TAKEN_AS_THEY_ARE = (
     "land_use",
 )
 
-_ADVICE = "give a WRF output file (wrfout_*) that holds them"
 _FORMAT_ADVICE = "give a WRF output file (wrfout_*) in NetCDF"
 
 
@@ -127,14 +103,15 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
     xarray.Dataset
         Coordinates ``time``, of the whole file, and ``latitude`` and ``longitude`` (y, x)
         [degree]; ``land_mask`` and ``sea_ice`` if the file has them. Attributes ``title``,
-        ``microphysics_scheme`` (a name of `SCHEMES`, or ``"MP_PHYSICS=99"`` for a number that is
-        not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may hold
-        fewer), ``moving_nest`` (1 where positions differ from time to time, else 0) and those of
+        ``microphysics_scheme`` (a name of `wrf_run.SCHEMES`, or ``"MP_PHYSICS=99"`` for a number
+        that is not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may
+        hold fewer), ``land_use_scheme`` (MMINLU), ``moving_nest`` (1 where positions differ from
+        time to time, else 0) and those of
         the map, as WRF names them (`projected`).
     """
     with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
-        require_variables(file, REQUIRED, path, _ADVICE)
-        times = _times(file, path)
+        require_variables(file, REQUIRED, path, ADVICE)
+        times = times_of(file, path)
         place = {"time": time, "rows": slice(None), "path": path}
         dataset = xr.Dataset(
             coords={
@@ -142,8 +119,8 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
                 "latitude": _field(file, "XLAT", **place),
                 "longitude": _field(file, "XLONG", **place),
             },
-            attrs=_attributes(file)
-            | {"moving_nest": int(_moves(file))}
+            attrs=run_attributes(file)
+            | {"moving_nest": int(moves(file))}
             | projection_attributes(file.attrs),
         )
         land_mask = _land_mask(file, **place)
@@ -180,8 +157,8 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
         which those of a block share with the rows beside it.
     """
     with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
-        require_variables(file, REQUIRED, path, _ADVICE)
-        times = _times(file, path)
+        require_variables(file, REQUIRED, path, ADVICE)
+        times = times_of(file, path)
         place = {"time": time, "rows": rows, "path": path}
         pressure = _field(file, "P", **place) + _field(file, "PB", **place)
         _check_sum(pressure, "layer_pressure", **place)
@@ -204,7 +181,7 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
             "latitude": _field(file, "XLAT", **place),
             "longitude": _field(file, "XLONG", **place),
         } | _bounds(file, **place)
-        attributes = _attributes(file)
+        attributes = run_attributes(file)
     dataset = xr.Dataset({n: _finish(f, n) for n, f in fields.items()}, coords, attributes)
     _check_columns(dataset, path)
     return dataset
@@ -295,55 +272,3 @@ def _check_columns(dataset: xr.Dataset, path: FilePath) -> None:
             f"PH + PHB in {path} does not rise from level to level in {np.count_nonzero(thin)} of "
             f"the {thin.size} columns read; the operator needs layers of positive thickness."
         )
-
-
-def _times(file: xr.Dataset, path: FilePath) -> np.ndarray:
-    """The times of a file, from `Times` or, failing that, from minutes since the start."""
-    if "Times" in file:
-        texts = [
-            text.decode("latin-1") if isinstance(text, bytes) else str(text)
-            for text in np.atleast_1d(file["Times"].values)
-        ]
-        return np.array([_time(text, "Times", path) for text in texts])
-    start = file.attrs.get("SIMULATION_START_DATE", file.attrs.get("START_DATE"))
-    if "XTIME" not in file or start is None:
-        raise InputError(f"{path} has no Times, nor XTIME with SIMULATION_START_DATE; {_ADVICE}.")
-    minutes = load_finite(file["XTIME"], path)
-    seconds = np.rint(60 * np.atleast_1d(minutes)).astype("timedelta64[s]")
-    return _time(str(start), "SIMULATION_START_DATE", path) + seconds.astype("timedelta64[ns]")
-
-
-def _time(text: str, name: str, path: FilePath) -> np.datetime64:
-    """Parse WRF's way of writing a time, ``2007-10-23_18:00:00``."""
-    try:
-        return np.datetime64(text.strip("\0 ").replace("_", "T"), "ns")
-    except ValueError as error:
-        raise InputError(
-            f"{name} in {path} is {text!r}, which is no time; "
-            "it should be written as 2007-10-23_18:00:00."
-        ) from error
-
-
-def _moves(file: xr.Dataset) -> bool:
-    """Whether the grid is elsewhere at another time."""
-    corners = {"south_north": [0, -1], "west_east": [0, -1]}
-    return any(
-        "Time" in file[name].dims and bool(np.ptp(file[name].isel(corners).values, axis=0).any())
-        for name in ("XLAT", "XLONG")
-    )
-
-
-def _attributes(file: xr.Dataset) -> dict[str, str | int]:
-    """What later steps need to know of the run."""
-    attributes: dict[str, str | int] = {}
-    if "TITLE" in file.attrs:
-        attributes["title"] = str(file.attrs["TITLE"]).strip()
-    if "MP_PHYSICS" in file.attrs:
-        number = int(file.attrs["MP_PHYSICS"])
-        attributes["microphysics_scheme"] = SCHEMES.get(number, f"MP_PHYSICS={number}")
-    if "BOTTOM-TOP_GRID_DIMENSION" in file.attrs:
-        num_levels = int(file.attrs["BOTTOM-TOP_GRID_DIMENSION"])
-        attributes["bottom_top_levels_of_run"] = num_levels - 1
-    if "MMINLU" in file.attrs:
-        attributes["land_use_scheme"] = str(file.attrs["MMINLU"]).strip("\0 ")
-    return attributes

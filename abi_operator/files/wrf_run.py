@@ -1,0 +1,86 @@
+"""When a WRF file is, and what it says of the run that wrote it."""
+
+import numpy as np
+import xarray as xr
+
+from .errors import InputError
+from .netcdf import FilePath, load_finite
+
+SCHEMES: dict[int, str] = {
+    1: "kessler",
+    2: "lin",
+    3: "wsm3",
+    4: "wsm5",
+    6: "wsm6",
+    7: "goddard",
+    8: "thompson",
+    9: "milbrandt",
+    10: "morrison",
+    14: "wdm5",
+    16: "wdm6",
+    17: "nssl",
+    18: "nssl",
+    22: "nssl",
+    28: "thompson",  # aware of aerosol, which adds the number of droplets
+    40: "morrison",  # likewise
+    50: "p3",
+    51: "p3",
+    52: "p3",
+    55: "ishmael",
+}
+"""MP_PHYSICS, WRF's number of a microphysics scheme: its name. (Registry.EM_COMMON of WRF)"""
+
+ADVICE = "give a WRF output file (wrfout_*) that holds them"
+"""What to do about a file that lacks what is needed."""
+
+
+def times_of(file: xr.Dataset, path: FilePath) -> np.ndarray:
+    """The times of a file, from `Times` or, failing that, from minutes since the start."""
+    if "Times" in file:
+        texts = [
+            text.decode("latin-1") if isinstance(text, bytes) else str(text)
+            for text in np.atleast_1d(file["Times"].values)
+        ]
+        return np.array([_time(text, "Times", path) for text in texts])
+    start = file.attrs.get("SIMULATION_START_DATE", file.attrs.get("START_DATE"))
+    if "XTIME" not in file or start is None:
+        raise InputError(f"{path} has no Times, nor XTIME with SIMULATION_START_DATE; {ADVICE}.")
+    minutes = load_finite(file["XTIME"], path)
+    seconds = np.rint(60 * np.atleast_1d(minutes)).astype("timedelta64[s]")
+    return _time(str(start), "SIMULATION_START_DATE", path) + seconds.astype("timedelta64[ns]")
+
+
+def _time(text: str, name: str, path: FilePath) -> np.datetime64:
+    """Parse WRF's way of writing a time, ``2007-10-23_18:00:00``."""
+    try:
+        return np.datetime64(text.strip("\0 ").replace("_", "T"), "ns")
+    except ValueError as error:
+        raise InputError(
+            f"{name} in {path} is {text!r}, which is no time; "
+            "it should be written as 2007-10-23_18:00:00."
+        ) from error
+
+
+def moves(file: xr.Dataset) -> bool:
+    """Whether the grid is elsewhere at another time."""
+    corners = {"south_north": [0, -1], "west_east": [0, -1]}
+    return any(
+        "Time" in file[name].dims and bool(np.ptp(file[name].isel(corners).values, axis=0).any())
+        for name in ("XLAT", "XLONG")
+    )
+
+
+def run_attributes(file: xr.Dataset) -> dict[str, str | int]:
+    """What later steps need to know of the run."""
+    attributes: dict[str, str | int] = {}
+    if "TITLE" in file.attrs:
+        attributes["title"] = str(file.attrs["TITLE"]).strip()
+    if "MP_PHYSICS" in file.attrs:
+        number = int(file.attrs["MP_PHYSICS"])
+        attributes["microphysics_scheme"] = SCHEMES.get(number, f"MP_PHYSICS={number}")
+    if "BOTTOM-TOP_GRID_DIMENSION" in file.attrs:
+        num_levels = int(file.attrs["BOTTOM-TOP_GRID_DIMENSION"])
+        attributes["bottom_top_levels_of_run"] = num_levels - 1
+    if "MMINLU" in file.attrs:
+        attributes["land_use_scheme"] = str(file.attrs["MMINLU"]).strip("\0 ")
+    return attributes
