@@ -1,4 +1,4 @@
-"""The command line: ``abi-operator simulate`` and ``abi-operator demo``.
+"""The command line: ``abi-operator`` and its commands.
 
 Inputs are opened and checked before a folder is made; what is wrong with one of them is said in
 one sentence, with exit code 2. Other packages add commands of their own by entry points of the
@@ -12,9 +12,7 @@ threads, and so do the retrievals. More CPU devices of JAX would do nothing for 
 
 import gc
 import sys
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,25 +22,18 @@ import typer
 
 from . import _ending, _kept
 from ._version import __version__
-from .bands import BANDS, GRASSO2013, check_bands
-from .commands import one_sentence, typed
+from .commands import one_sentence, typed, user_warnings
 from .demo import write_demo
 from .files import output_folder
 from .guard.commands import jacobian
-from .microphysics import SCHEMES
-from .optics import ALL_GASES
-from .satellites import SATELLITES
-from .scene import CLASSES, DropletNumber
+from .simulate_command import print_report, simulate
 from .simulation import (
-    Report,
     Request,
-    Species,
     open_scene,
     pictures_of_before,
     simulate_scene,
 )
-from .speed import default_cache_folder, usable_cores, use_compilation_cache, use_compiler_flags
-from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
+from .speed import default_cache_folder, use_compilation_cache, use_compiler_flags
 
 COMMANDS = "abi_operator.commands"
 """Group of the entry points by which other packages add commands."""
@@ -50,251 +41,9 @@ COMMANDS = "abi_operator.commands"
 # Albedo of the sea in the demonstration. [-]
 _DEMO_OCEAN_ALBEDO = 0.03
 
-_ALL, _NONE = "all", "none"
 _NO_CACHE = "--no-cache"
 _NO_CACHE_HELP = "Use and keep no compiled programs; also behind a command's name."
 _VERSION = "Say which version this is."
-_IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
-
-
-@contextmanager
-def _user_warnings() -> Iterator[None]:
-    """Collect warnings; print each once, as a plain line, at the end."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", UserWarning)
-        yield
-    for message in dict.fromkeys(str(warning.message) for warning in caught):
-        typer.echo(f"warning: {message}", err=True)
-
-
-def _print(report: Report, out: Path, before: list[str]) -> None:
-    for name in report.files:
-        typer.echo(f"wrote {out / name}")
-    for name in sorted(set(before) - set(report.files)):
-        typer.echo(f"removed {out / name}, a picture of the result before")
-    for line in report.lines:
-        typer.echo(line)
-    cores = usable_cores()
-    typer.echo(f"computed on {cores} core{'s' if cores > 1 else ''}")
-
-
-def simulate(
-    context: typer.Context,
-    wrf: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="WRFOUT...",
-            help="Output of the WRF model (wrfout_*): one file or more of one domain, any times, "
-            "or patterns of names.",
-        ),
-    ],
-    out: Annotated[
-        Path, typer.Option(help="Folder for result.nc and the pictures (PNG); made if need be.")
-    ],
-    time: Annotated[
-        str | None,
-        typer.Option(
-            help="Times to simulate, as 2005-08-28T12:00 or 2005-08-28 for those of a day, or "
-            "counted from 0; several by commas. All without."
-        ),
-    ] = None,
-    bands: Annotated[
-        str,
-        typer.Option(
-            help=f"Bands to simulate, of {', '.join(BANDS)}; all: C01 to C07. "
-            "C01,C02,C03 make a picture in natural colours."
-        ),
-    ] = ",".join(GRASSO2013),
-    albedo: Annotated[
-        Path | None,
-        typer.Option(
-            help="How bright the land is: MODIS albedo MCD43A1, Band1, Band2, Band3, Band6 and "
-            "Band7, as a NetCDF file from AppEEARS."
-        ),
-    ] = None,
-    ocean_albedo: Annotated[
-        float | None,
-        typer.Option(
-            min=0, max=1, help="How bright water is, in all bands but C07: 0.03 to 0.06 is usual."
-        ),
-    ] = None,
-    land_albedo: Annotated[
-        str | None,
-        typer.Option(
-            help="Albedo of land that the albedo file, if any, has none of: a number for all bands "
-            "but C07, or model (its own, broadband)."
-        ),
-    ] = None,
-    sea_ice_albedo: Annotated[
-        str | None,
-        typer.Option(
-            help="Albedo of sea ice, where the model has some: a number for all bands but C07, or "
-            f"one of {', '.join(SNOW_AND_ICE_ALBEDO)}. Without it such columns are left out."
-        ),
-    ] = None,
-    snow_albedo: Annotated[
-        str | None,
-        typer.Option(
-            help="Albedo of the model's snow on the ground, likewise. Without it the ground has "
-            "that of the file."
-        ),
-    ] = None,
-    broadband: Annotated[
-        bool,
-        typer.Option(
-            help="Where the albedo file lacks a band, take its broadband albedo for it, which is "
-            "less exact."
-        ),
-    ] = False,
-    emissivity: Annotated[
-        str | None,
-        typer.Option(
-            help="Of the ground in C07, which C07 needs: a number, model (its own, broadband), "
-            "land-use (that of each column's land use), or one of "
-            f"{', '.join(EMISSIVITY_3900NM)}."
-        ),
-    ] = None,
-    plume: Annotated[
-        Path | None,
-        typer.Option(
-            help="Add a plume where this greyscale PNG is bright, one pixel a column, north at "
-            "the top."
-        ),
-    ] = None,
-    plume_species: Annotated[Species, typer.Option(help="What the plume is made of.")] = (
-        Species.SMOKE
-    ),
-    plume_aod: Annotated[
-        float, typer.Option(min=0, help="Optical depth of the plume at 550 nm where it is white.")
-    ] = 2.0,
-    gases: Annotated[
-        str, typer.Option(help=f"Gases that absorb: all, none, or some of {', '.join(ALL_GASES)}.")
-    ] = _ALL,
-    hydrometeors: Annotated[
-        str,
-        typer.Option(
-            help="Rain and ice to simulate beside cloud water: all that WRFOUT has, none, or some "
-            f"of {', '.join(CLASSES)}."
-        ),
-    ] = _ALL,
-    microphysics: Annotated[
-        str | None,
-        typer.Option(
-            help="Scheme to assume in place of the model's where it gives no number of particles: "
-            f"{', '.join(SCHEMES)}."
-        ),
-    ] = None,
-    droplet_number: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N | WATER,LAND",
-            help="Cloud droplets per cm3 where the model has no number of them; if not given, what "
-            "its microphysics assumes, or else 100,300.",
-        ),
-    ] = None,
-    satellite: Annotated[
-        str, typer.Option(help=f"Whose imager looks: {', '.join(SATELLITES)}.")
-    ] = "GOES-16",
-    satellite_longitude: Annotated[
-        float | None,
-        typer.Option(
-            min=-180,
-            max=360,
-            help="Where the satellite stands above the equator, in degrees, east positive, if not "
-            "at its usual place.",
-        ),
-    ] = None,
-    num_streams: Annotated[
-        int,
-        typer.Option(
-            min=2,
-            help="Directions by which scattered light is computed, even: more are more exact and "
-            "slower.",
-        ),
-    ] = 8,
-    variables: Annotated[
-        str,
-        typer.Option(
-            help="What result.nc keeps: all, which `abi-operator retrieve` needs; image, without "
-            "the air's layers, a fifth of the size or less; or names such as "
-            "reflectance_factor,radiance."
-        ),
-    ] = _ALL,
-    rayleigh_correction: Annotated[
-        bool,
-        typer.Option(
-            help="Take the blue haze of the air out of the picture in natural colours; result.nc "
-            "has it in any case."
-        ),
-    ] = True,
-) -> None:
-    """Simulate what the imager would see of a scene in a weather model's output.
-
-    Writes a folder with result.nc (reflectances and radiances of every band, and what they were
-    computed from) and a picture of every time. Columns over land need --albedo and those over water
-    --ocean-albedo.
-
-    \b
-    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --ocean-albedo 0.06 --out sea
-    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --albedo MCD43A1.nc \\
-        --ocean-albedo 0.03 --bands all --emissivity grassland --out coast
-
-    `abi-operator demo --size 16` makes files to try it with.
-    """
-    if num_streams % 2:
-        raise typer.BadParameter(f"the number of streams is even; got {num_streams}.")
-    try:
-        names = check_bands(_names(bands, _IMAGER_BANDS))
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from None
-    with one_sentence():
-        droplets = None if droplet_number is None else DropletNumber.from_text(droplet_number)
-    request = Request(
-        wrf,
-        time=time,
-        bands=names,
-        albedo=albedo,
-        ocean_albedo=ocean_albedo,
-        land_albedo=_number(land_albedo),
-        sea_ice_albedo=_number(sea_ice_albedo),
-        snow_albedo=_number(snow_albedo),
-        broadband=broadband,
-        emissivity=_number(emissivity),
-        plume=plume,
-        plume_species=plume_species,
-        plume_aod=plume_aod,
-        gases=_names(gases, ALL_GASES),
-        hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
-        microphysics=microphysics,
-        droplet_number=droplets,
-        satellite=satellite,
-        satellite_longitude=satellite_longitude,
-        num_streams=num_streams,
-        variables=tuple(name.strip() for name in variables.split(",")),
-        rayleigh_correction=rayleigh_correction,
-        command=typed(context),
-    )
-    with one_sentence(), _user_warnings():
-        scene = open_scene(request)
-        before = pictures_of_before(out)
-        with output_folder(out, outdated=before) as folder:
-            report = simulate_scene(scene, folder)
-        _print(report, out, before)
-
-
-def _names(text: str, everything: tuple[str, ...]) -> tuple[str, ...]:
-    """Names that are separated by commas; all of them, or none."""
-    if text in (_ALL, _NONE):
-        return everything if text == _ALL else ()
-    return tuple(name.strip() for name in text.split(","))
-
-
-def _number(text: str | None) -> float | str | None:
-    """A number where the text is one."""
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        return text
 
 
 def demo(
@@ -310,7 +59,7 @@ def demo(
     retrievals are installed, which come with this package, the smoke is then retrieved from the
     simulated image and compared with the smoke that was made up (retrieval.nc, scores.csv).
     """
-    with one_sentence(), _user_warnings():
+    with one_sentence(), user_warnings():
         before = pictures_of_before(out)
         with output_folder(out, outdated=before) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
@@ -318,7 +67,7 @@ def demo(
             request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume, gases=())
             request = request._replace(command=typed(context))
             report = simulate_scene(open_scene(request), folder)
-        _print(report, out, before)
+        print_report(report, out, before)
     for entry in entry_points(group=COMMANDS, name="demo"):
         finish_demo = _load(entry)
         if finish_demo is not None:
@@ -396,7 +145,7 @@ def _prepare_process(keep_programs: bool) -> None:
     use_compiler_flags()
     if not keep_programs:
         jax.config.update("jax_enable_compilation_cache", False)
-    with _user_warnings():
+    with user_warnings():
         folder = use_compilation_cache()
     if folder is not None:
         _kept.use(folder)

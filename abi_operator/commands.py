@@ -1,6 +1,7 @@
 """What the commands of this package and of others that join its command line share."""
 
 import shlex
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -39,3 +40,13 @@ def typed(context: typer.Context) -> str:
 
 def _words(value: Any) -> list[str]:
     return [str(one) for one in value] if isinstance(value, list | tuple) else [str(value)]
+
+
+@contextmanager
+def user_warnings() -> Iterator[None]:
+    """Collect warnings; print each once, as a plain line, at the end."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        yield
+    for message in dict.fromkeys(str(warning.message) for warning in caught):
+        typer.echo(f"warning: {message}", err=True)

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = [
     {"__main__"},
     {"cli"},
+    {"simulate_command"},
     {"guard", "simulation"},
     {"commands", "demo", "drawing", "report", "request"},
     {"scene"},

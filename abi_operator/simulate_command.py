@@ -1,0 +1,260 @@
+"""The command ``abi-operator simulate``: what it asks, and what it prints.
+
+Inputs are opened and checked before a folder is made.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .bands import BANDS, GRASSO2013, check_bands
+from .commands import one_sentence, typed, user_warnings
+from .files import output_folder
+from .microphysics import SCHEMES
+from .optics import ALL_GASES
+from .satellites import SATELLITES
+from .scene import CLASSES, DropletNumber
+from .simulation import (
+    Report,
+    Request,
+    Species,
+    open_scene,
+    pictures_of_before,
+    simulate_scene,
+)
+from .speed import usable_cores
+from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
+
+_ALL, _NONE = "all", "none"
+_IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
+
+
+def simulate(
+    context: typer.Context,
+    wrf: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="WRFOUT...",
+            help="Output of the WRF model (wrfout_*): one file or more of one domain, any times, "
+            "or patterns of names.",
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option(help="Folder for result.nc and the pictures (PNG); made if need be.")
+    ],
+    time: Annotated[
+        str | None,
+        typer.Option(
+            help="Times to simulate, as 2005-08-28T12:00 or 2005-08-28 for those of a day, or "
+            "counted from 0; several by commas. All without."
+        ),
+    ] = None,
+    bands: Annotated[
+        str,
+        typer.Option(
+            help=f"Bands to simulate, of {', '.join(BANDS)}; all: C01 to C07. "
+            "C01,C02,C03 make a picture in natural colours."
+        ),
+    ] = ",".join(GRASSO2013),
+    albedo: Annotated[
+        Path | None,
+        typer.Option(
+            help="How bright the land is: MODIS albedo MCD43A1, Band1, Band2, Band3, Band6 and "
+            "Band7, as a NetCDF file from AppEEARS."
+        ),
+    ] = None,
+    ocean_albedo: Annotated[
+        float | None,
+        typer.Option(
+            min=0, max=1, help="How bright water is, in all bands but C07: 0.03 to 0.06 is usual."
+        ),
+    ] = None,
+    land_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of land that the albedo file, if any, has none of: a number for all bands "
+            "but C07, or model (its own, broadband)."
+        ),
+    ] = None,
+    sea_ice_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of sea ice, where the model has some: a number for all bands but C07, or "
+            f"one of {', '.join(SNOW_AND_ICE_ALBEDO)}. Without it such columns are left out."
+        ),
+    ] = None,
+    snow_albedo: Annotated[
+        str | None,
+        typer.Option(
+            help="Albedo of the model's snow on the ground, likewise. Without it the ground has "
+            "that of the file."
+        ),
+    ] = None,
+    broadband: Annotated[
+        bool,
+        typer.Option(
+            help="Where the albedo file lacks a band, take its broadband albedo for it, which is "
+            "less exact."
+        ),
+    ] = False,
+    emissivity: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the ground in C07, which C07 needs: a number, model (its own, broadband), "
+            "land-use (that of each column's land use), or one of "
+            f"{', '.join(EMISSIVITY_3900NM)}."
+        ),
+    ] = None,
+    plume: Annotated[
+        Path | None,
+        typer.Option(
+            help="Add a plume where this greyscale PNG is bright, one pixel a column, north at "
+            "the top."
+        ),
+    ] = None,
+    plume_species: Annotated[Species, typer.Option(help="What the plume is made of.")] = (
+        Species.SMOKE
+    ),
+    plume_aod: Annotated[
+        float, typer.Option(min=0, help="Optical depth of the plume at 550 nm where it is white.")
+    ] = 2.0,
+    gases: Annotated[
+        str, typer.Option(help=f"Gases that absorb: all, none, or some of {', '.join(ALL_GASES)}.")
+    ] = _ALL,
+    hydrometeors: Annotated[
+        str,
+        typer.Option(
+            help="Rain and ice to simulate beside cloud water: all that WRFOUT has, none, or some "
+            f"of {', '.join(CLASSES)}."
+        ),
+    ] = _ALL,
+    microphysics: Annotated[
+        str | None,
+        typer.Option(
+            help="Scheme to assume in place of the model's where it gives no number of particles: "
+            f"{', '.join(SCHEMES)}."
+        ),
+    ] = None,
+    droplet_number: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N | WATER,LAND",
+            help="Cloud droplets per cm3 where the model has no number of them; if not given, what "
+            "its microphysics assumes, or else 100,300.",
+        ),
+    ] = None,
+    satellite: Annotated[
+        str, typer.Option(help=f"Whose imager looks: {', '.join(SATELLITES)}.")
+    ] = "GOES-16",
+    satellite_longitude: Annotated[
+        float | None,
+        typer.Option(
+            min=-180,
+            max=360,
+            help="Where the satellite stands above the equator, in degrees, east positive, if not "
+            "at its usual place.",
+        ),
+    ] = None,
+    num_streams: Annotated[
+        int,
+        typer.Option(
+            min=2,
+            help="Directions by which scattered light is computed, even: more are more exact and "
+            "slower.",
+        ),
+    ] = 8,
+    variables: Annotated[
+        str,
+        typer.Option(
+            help="What result.nc keeps: all, which `abi-operator retrieve` needs; image, without "
+            "the air's layers, a fifth of the size or less; or names such as "
+            "reflectance_factor,radiance."
+        ),
+    ] = _ALL,
+    rayleigh_correction: Annotated[
+        bool,
+        typer.Option(
+            help="Take the blue haze of the air out of the picture in natural colours; result.nc "
+            "has it in any case."
+        ),
+    ] = True,
+) -> None:
+    """Simulate what the imager would see of a scene in a weather model's output.
+
+    Writes a folder with result.nc (reflectances and radiances of every band, and what they were
+    computed from) and a picture of every time. Columns over land need --albedo and those over water
+    --ocean-albedo.
+
+    \b
+    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --ocean-albedo 0.06 --out sea
+    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --albedo MCD43A1.nc \\
+        --ocean-albedo 0.03 --bands all --emissivity grassland --out coast
+
+    `abi-operator demo --size 16` makes files to try it with.
+    """
+    if num_streams % 2:
+        raise typer.BadParameter(f"the number of streams is even; got {num_streams}.")
+    try:
+        names = check_bands(_names(bands, _IMAGER_BANDS))
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    with one_sentence():
+        droplets = None if droplet_number is None else DropletNumber.from_text(droplet_number)
+    request = Request(
+        wrf,
+        time=time,
+        bands=names,
+        albedo=albedo,
+        ocean_albedo=ocean_albedo,
+        land_albedo=_number(land_albedo),
+        sea_ice_albedo=_number(sea_ice_albedo),
+        snow_albedo=_number(snow_albedo),
+        broadband=broadband,
+        emissivity=_number(emissivity),
+        plume=plume,
+        plume_species=plume_species,
+        plume_aod=plume_aod,
+        gases=_names(gases, ALL_GASES),
+        hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
+        microphysics=microphysics,
+        droplet_number=droplets,
+        satellite=satellite,
+        satellite_longitude=satellite_longitude,
+        num_streams=num_streams,
+        variables=tuple(name.strip() for name in variables.split(",")),
+        rayleigh_correction=rayleigh_correction,
+        command=typed(context),
+    )
+    with one_sentence(), user_warnings():
+        scene = open_scene(request)
+        before = pictures_of_before(out)
+        with output_folder(out, outdated=before) as folder:
+            report = simulate_scene(scene, folder)
+        print_report(report, out, before)
+
+
+def _names(text: str, everything: tuple[str, ...]) -> tuple[str, ...]:
+    """Names that are separated by commas; all of them, or none."""
+    if text in (_ALL, _NONE):
+        return everything if text == _ALL else ()
+    return tuple(name.strip() for name in text.split(","))
+
+
+def _number(text: str | None) -> float | str | None:
+    """A number where the text is one."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
+
+
+def print_report(report: Report, out: Path, before: list[str]) -> None:
+    for name in report.files:
+        typer.echo(f"wrote {out / name}")
+    for name in sorted(set(before) - set(report.files)):
+        typer.echo(f"removed {out / name}, a picture of the result before")
+    for line in report.lines:
+        typer.echo(line)
+    cores = usable_cores()
+    typer.echo(f"computed on {cores} core{'s' if cores > 1 else ''}")
