@@ -106,8 +106,7 @@ def wrf_coordinates(path: FilePath, time: int = 0) -> xr.Dataset:
         ``microphysics_scheme`` (a name of `wrf_run.SCHEMES`, or ``"MP_PHYSICS=99"`` for a number
         that is not there), ``bottom_top_levels_of_run`` (layers of the run, of which the file may
         hold fewer), ``land_use_scheme`` (MMINLU), ``moving_nest`` (1 where positions differ from
-        time to time, else 0) and those of
-        the map, as WRF names them (`projected`).
+        time to time, else 0) and those of the map, as WRF names them (`projected`).
     """
     with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
         require_variables(file, REQUIRED, path, ADVICE)
