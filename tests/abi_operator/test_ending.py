@@ -139,6 +139,41 @@ def test_signals_are_the_business_of_whoever_imports_us(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+class Stopped(Exception):
+    """Raised where the main thread would stand still for good."""
+
+
+def test_the_main_thread_stands_still_but_not_while_results_are_put_in_place(monkeypatch):
+    def stop(seconds):
+        raise Stopped
+
+    monkeypatch.setattr(_ending, "_told", False)
+    monkeypatch.setattr(_ending.time, "sleep", stop)
+    with pytest.raises(Stopped):
+        _ending._hear(signal.SIGINT, None)
+    put = []
+    with pytest.raises(Stopped), _ending.undisturbed():
+        _ending._hear(signal.SIGINT, None)
+        put.append("all")
+    assert put == ["all"]
+
+
+def test_folders_and_files_that_are_unfinished_are_removed(tmp_path, monkeypatch):
+    assert _ending._remove_unfinished() == ""
+    folder, file = tmp_path / "folder", tmp_path / "file"
+    (folder / "below").mkdir(parents=True)
+    (folder / "below" / "result.nc").touch()
+    file.touch()
+    with _ending.unfinished(folder), _ending.unfinished(file):
+        assert _ending._remove_unfinished() == "; what was unfinished has been removed"
+    assert list(tmp_path.iterdir()) == []
+    file.touch()
+    monkeypatch.setattr(_ending, "_PATIENCE", 0.0)
+    monkeypatch.setattr(Path, "unlink", lambda self: None)  # as if it could not be
+    with _ending.unfinished(file):
+        assert _ending._remove_unfinished() == f"; {file} could not be removed"
+
+
 def test_the_next_run_removes_what_a_killed_one_left_and_not_what_a_live_one_writes(tmp_path):
     with begun(UNFINISHED, tmp_path) as alive, begun(UNFINISHED, tmp_path) as killed:
         killed.kill()
