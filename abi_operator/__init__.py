@@ -10,7 +10,7 @@ shines too. Exact derivatives with respect to everything in the state come by `j
 own, under `jax.jit`, and `use_compilation_cache` compiles them once and not in every process.
 """
 
-from . import _ending as _ending  # the first, as JAX takes a second to import
+from . import _ending as _ending
 from ._version import __version__ as __version__
 from .atmosphere import Atmosphere as Atmosphere
 from .atmosphere import Fire as Fire
@@ -23,6 +23,8 @@ from .atmosphere import State as State
 from .bands import BANDS as BANDS
 from .bands import GRASSO2013 as GRASSO2013
 from .geometry import Geometry as Geometry
+from .machine.speed import use_compilation_cache as use_compilation_cache
+from .machine.speed import use_full_speed as use_full_speed
 from .optics import ash as ash
 from .optics import mie_plume as mie_plume
 from .optics import smoke as smoke
@@ -33,7 +35,5 @@ from .radiance import brightness_temperature as brightness_temperature
 from .radiance import radiance as radiance
 from .reflectance import brf as brf
 from .reflectance import reflectance_factor as reflectance_factor
-from .speed import use_compilation_cache as use_compilation_cache
-from .speed import use_full_speed as use_full_speed
 from .standard_atmospheres import standard_atmosphere as standard_atmosphere
 from .state_checks import check_state as check_state

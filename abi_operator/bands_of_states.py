@@ -13,11 +13,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ._batching import map_tiles, on_every_device, tile_size
-from ._door import Leaves
-from ._slopes import chosen
 from .atmosphere import State
 from .band_columns import BandColumns, columns_of_bands
+from .machine.batching import map_tiles, on_every_device, tile_size
+from .machine.door import Leaves
+from .machine.slopes import chosen
 from .optics import num_terms
 from .solver import sufficient_doublings, toa_brf, toa_radiance
 

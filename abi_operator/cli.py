@@ -20,20 +20,16 @@ from typing import Annotated, Any
 import jax
 import typer
 
-from . import _ending, _kept
+from . import _ending
 from ._version import __version__
 from .commands import one_sentence, typed, user_warnings
 from .demo import write_demo
 from .files import output_folder
 from .guard.commands import jacobian
+from .machine import kept
+from .machine.speed import default_cache_folder, use_compilation_cache, use_compiler_flags
 from .simulate_command import print_report, simulate
-from .simulation import (
-    Request,
-    open_scene,
-    pictures_of_before,
-    simulate_scene,
-)
-from .speed import default_cache_folder, use_compilation_cache, use_compiler_flags
+from .simulation import Request, open_scene, pictures_of_before, simulate_scene
 
 COMMANDS = "abi_operator.commands"
 """Group of the entry points by which other packages add commands."""
@@ -148,7 +144,7 @@ def _prepare_process(keep_programs: bool) -> None:
     with user_warnings():
         folder = use_compilation_cache()
     if folder is not None:
-        _kept.use(folder)
+        kept.use(folder)
 
 
 def main(name: str | None = None) -> None:

@@ -3,10 +3,10 @@
 How often the solver doubles its layers is a property of a program for slopes and chosen from the
 thickest layer of all columns. Its optical depth is read before the program is: at the door, in the
 rules of derivatives and in that of `jax.vmap`, all of which know the values that they transform
-(`_door`). Inside `jax.jit` or a loop nobody does, and the slopes are right for layers up to
+(`machine.door`). Inside `jax.jit` or a loop nobody does, and the slopes are right for layers up to
 `TRACED_TAU`: those of columns with a thicker one come back as NaN, and so do the values beside
 them, unless the layer lets no light through anyway. A program for values alone doubles each layer
-as it needs, whoever can read it (`solver.doublings`).
+as it needs, whoever can read it (`solver.method.doublings`).
 """
 
 from collections.abc import Sequence
@@ -17,15 +17,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ._door import Leaves, enter
 from .band_columns import HARMLESS_ZENITH, columns_of_bands
-from .bands_of_states import (
-    Inputs,
-    Options,
-    tile_of_states,
-    values,
-    values_and_slopes,
-)
+from .bands_of_states import Inputs, Options, tile_of_states, values, values_and_slopes
+from .machine.door import Leaves, enter
 from .solver import sufficient_doublings
 
 # Columns whose layers are read together, in chunks of one of these.
@@ -51,7 +45,7 @@ def solve(
 
 
 class _Program(NamedTuple):
-    """`_door.Program` of the leaves of `Inputs`, which for slopes reads the layers."""
+    """`machine.door.Program` of the leaves of `Inputs`, which for slopes reads the layers."""
 
     structure: Any
     options: Options
@@ -97,7 +91,7 @@ class _Program(NamedTuple):
 
 
 class _Depths(NamedTuple):
-    """`_door.Program` of the largest optical depth of any layer of a column, in any band. [-]"""
+    """`door.Program` of the largest optical depth of any layer of a column, in any band. [-]"""
 
     structure: Any
     options: Options

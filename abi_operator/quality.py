@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, UInt8
 
-from ._batching import map_tiles
 from .atmosphere import State
 from .band_columns import above_horizon, ground_of
 from .bands import BANDS, GRASSO2013
+from .machine.batching import map_tiles
 from .nomenclature import GRAZING_ZENITH, LARGEST_SHARE_OUTSIDE, QUALITY_FLAGS
 from .optics import outside_fitted_range as outside_of_column
 from .state_checks import checked_bands, uniform

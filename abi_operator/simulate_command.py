@@ -11,19 +11,12 @@ import typer
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence, typed, user_warnings
 from .files import output_folder
+from .machine.speed import usable_cores
 from .microphysics import SCHEMES
 from .optics import ALL_GASES
 from .satellites import SATELLITES
 from .scene import CLASSES, DropletNumber
-from .simulation import (
-    Report,
-    Request,
-    Species,
-    open_scene,
-    pictures_of_before,
-    simulate_scene,
-)
-from .speed import usable_cores
+from .simulation import Report, Request, Species, open_scene, pictures_of_before, simulate_scene
 from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
 
 _ALL, _NONE = "all", "none"

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from ._numerics import converted
 from .atmosphere import State
 from .bands import check_bands
+from .machine.algebra import converted
 from .satellites import check_satellite, gas_fit_covers
 
 _INF = float("inf")

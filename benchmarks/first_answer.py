@@ -39,8 +39,8 @@ from abi_operator import (
     standard_atmosphere,
     use_compilation_cache,
 )
+from abi_operator.machine.speed import usable_cores
 from abi_operator.solver import toa_brf
-from abi_operator.speed import usable_cores
 
 BIG = 0.5  # seconds that a program compiles
 SEVEN = ("C01", "C02", "C03", "C04", "C05", "C06", "C07")

@@ -30,12 +30,12 @@ from abi_operator.files import (
     stored,
     wrf_coordinates,
 )
+from abi_operator.machine.speed import usable_cores
 from abi_operator.optics import column_optics
 from abi_operator.pictures import write_png
 from abi_operator.products import natural_color
 from abi_operator.scene import PlumeSpecification, column_states, scenario, simulate
 from abi_operator.solver import cos_scattering_angle, toa_brf
-from abi_operator.speed import usable_cores
 
 OCEAN_ALBEDO = 0.03
 REFERENCE_STREAMS = 32

@@ -3,8 +3,8 @@
     python benchmarks/layout.py [--repeats 5]
 
 prints microseconds per layer and azimuth mode of the solver against the tile of columns that stays
-in the cache (`abi_operator._batching`), and seconds of a retrieval against the chunk of pixels that
-waits for its slowest member (`retrievals.chunks`). Float64; compiling apart.
+in the cache (`abi_operator.machine.batching`), and seconds of a retrieval against the chunk of
+pixels that waits for its slowest member (`retrievals.chunks`). Float64; compiling apart.
 """
 
 import argparse

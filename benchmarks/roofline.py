@@ -19,8 +19,8 @@ import numpy as np
 import workload
 from rounds import table
 
-from abi_operator._batching import tile_size
-from abi_operator._numerics import matmul
+from abi_operator.machine.algebra import matmul
+from abi_operator.machine.batching import tile_size
 
 LAYERS = 20
 

@@ -24,8 +24,8 @@ from peers import MEASURED_STREAMS, NUM_MOMENTS, PEERS, Peers, peer_version, usa
 from rounds import AGREE, Bars, Program, Rounds, apart, digits, relative, table
 
 from abi_operator import __version__
+from abi_operator.machine.speed import usable_cores
 from abi_operator.solver import double_gauss
-from abi_operator.speed import usable_cores
 
 TRUE_STREAMS = 64
 PEER_SHARE = 0.8  # of its earlier rate relative to nanodisort's, or the comparison is unfair

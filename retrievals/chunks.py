@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from abi_operator.speed import usable_cores
+from abi_operator.machine.speed import usable_cores
 
 T = TypeVar("T")
 

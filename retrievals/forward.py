@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from abi_operator import BANDS, Atmosphere, Plume, State, reflectance_factor
+from abi_operator.machine.speed import Kept
 from abi_operator.optics import ALL_GASES, column_optics
 from abi_operator.solver import sufficient_doublings
-from abi_operator.speed import Kept
 
 from .chunks import map_chunks
 from .state_vector import StateVector

@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from abi_operator import State
-from abi_operator.speed import Kept
+from abi_operator.machine.speed import Kept
 
 from .chunks import CHUNK, map_chunks, meanwhile
 from .first_guess import candidates, guesses, scan

@@ -26,7 +26,7 @@ gc.set_threshold(50_000)
 # What one worker compiled the others read, and the processes that tests start. [s]
 _CACHE, _SHORTEST_COMPILATION = "JAX_COMPILATION_CACHE_DIR", 0.0
 
-# As the commands have it (`abi_operator._compiler`, which must not be imported here: what is
+# As the commands have it (`abi_operator.machine.compiler`, which must not be imported here: what is
 # imported before pytest is ready is not checked for shapes). All of XLA's flags must begin with two
 # dashes: those behind one that does not are passed over.
 _EXTRA = "--xla_backend_extra_options"

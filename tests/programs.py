@@ -2,8 +2,8 @@
 
 import jax
 
-from abi_operator import _chunks, _compiler, _door
-from abi_operator._kept import Kept
+from abi_operator.machine import chunks, compiler, door
+from abi_operator.machine.kept import Kept
 
 
 def programs_anew(monkeypatch):
@@ -13,9 +13,9 @@ def programs_anew(monkeypatch):
     """
 
     def anew(of, leaves):  # another function, of which JAX has no trace
-        return _door._wanted(of, leaves)
+        return door._wanted(of, leaves)
 
-    program = Kept(anew, _compiler.options())
-    monkeypatch.setattr(_door, "_inside", jax.jit(anew, static_argnums=0))
-    monkeypatch.setattr(_door, "_alone", lambda: program)
-    monkeypatch.setattr(_chunks, "_compiled", set())
+    program = Kept(anew, compiler.options())
+    monkeypatch.setattr(door, "_inside", jax.jit(anew, static_argnums=0))
+    monkeypatch.setattr(door, "_alone", lambda: program)
+    monkeypatch.setattr(chunks, "_compiled", set())

@@ -23,23 +23,8 @@ FLOORS = [
     {"microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
     {"geometry", "planck"},
-    {"satellites", "_door", "_elimination"},
-    {"_chunks", "speed"},
-    {"_lanes"},
-    {"_compiler", "_kept"},
-    {
-        "_batching",
-        "_ending",
-        "_kernels",
-        "_listening",
-        "_processor",
-        "_slopes",
-        "_numerics",
-        "_version",
-        "bands",
-        "constants",
-        "nomenclature",
-    },
+    {"satellites", "machine"},
+    {"_ending", "_numerics", "_version", "bands", "constants", "nomenclature"},
 ]
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 

@@ -11,14 +11,7 @@ from ..constants import GRAVITY, KAPPA
 from ..nomenclature import MODEL
 from .cell_bounds import cell_bounds
 from .errors import InputError
-from .netcdf import (
-    FilePath,
-    cf_attributes,
-    load,
-    open_netcdf,
-    require_dims,
-    require_variables,
-)
+from .netcdf import FilePath, cf_attributes, load, open_netcdf, require_dims, require_variables
 from .plausible import plausible, without_traces
 from .projection import projection_attributes
 from .wrf_run import ADVICE, moves, run_attributes, times_of

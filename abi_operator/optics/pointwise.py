@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array
 
-from .._numerics import fenced, total
+from ..machine.algebra import fenced, total
 
 _STATIC = bool, float, int, str
 

@@ -18,14 +18,7 @@ from ..microphysics import SCHEMES, Predicted, number_path
 from ..nomenclature import HYDROMETEORS
 from ..optics import from_effective_radius
 from .column_air import dry_air_path
-from .condensate import (
-    Condensate,
-    check_classes,
-    classes_present,
-    mixing_ratios,
-    scheme_of,
-    weigh,
-)
+from .condensate import Condensate, check_classes, classes_present, mixing_ratios, scheme_of, weigh
 from .droplet_number import AssumedDroplets, DropletNumber, assumed_droplets
 
 

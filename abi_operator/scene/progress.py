@@ -13,8 +13,8 @@ _INTERVAL = 1.0
 class Progress:
     """A bar of columns, drawn by a thread of its own; no bar where no terminal looks on.
 
-    A context manager, and a `_listening.Listener`: it is told of columns as they are solved, by as
-    many programs as a block takes, so that it moves in blocks that take minutes.
+    A context manager, and a `machine.listening.Listener`: it is told of columns as they are solved,
+    by as many programs as a block takes, so that it moves in blocks that take minutes.
 
     Parameters
     ----------

@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from .._chunks import map_chunks
-from .._listening import Listener, listening
 from ..atmosphere import Atmosphere, State
 from ..bands import BANDS, check_bands
 from ..files import InputError
 from ..files.netcdf import cf_attributes
+from ..machine.chunks import map_chunks
+from ..machine.listening import Listener, listening
 from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import aerosol, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
 from ..planck import brightness_temperature

@@ -7,8 +7,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .column import promoted
 from .door import prepare, solve
+from .method.surface import AnySurface
 from .program import GroundResponse, ground_response, plane_albedo
-from .surface import AnySurface
 
 
 def toa_albedo(

@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from .._batching import on_every_device
-from .._numerics import converted
-from .doublings import sufficient_doublings
-from .surface import AnySurface, Lambertian
+from ..machine.algebra import converted
+from ..machine.batching import on_every_device
+from .method.doublings import sufficient_doublings
+from .method.surface import AnySurface, Lambertian
 
 
 class Column(NamedTuple):

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .._batching import tile_size
-from .._door import Leaves, enter
-from .._slopes import slopes_by_reverse_mode
+from ..machine.batching import tile_size
+from ..machine.door import Leaves, enter
+from ..machine.independent_columns import independent_columns
+from ..machine.slopes import slopes_by_reverse_mode
 from .checks import check_arguments, check_in_memory
 from .column import (
     Column,
@@ -21,8 +22,7 @@ from .column import (
     own_axes,
     solved,
 )
-from .derivative import independent_columns
-from .doublings import unknown_doublings
+from .method.doublings import unknown_doublings
 
 
 def prepare(
@@ -88,7 +88,7 @@ def solve(
 
 
 class _Program(NamedTuple):
-    """`_door.Program` of the arguments of a door; for slopes it has a number of doublings."""
+    """`machine.door.Program` of a door's arguments; for slopes it has a number of doublings."""
 
     tile: Callable[[Column, Options], Any]
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None

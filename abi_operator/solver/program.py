@@ -6,10 +6,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._numerics import fenced
-from .adding import Emission, Top, emitting_ground
-from .adjoint import ModeSum, mode_sum
-from .azimuth import (
+from ..machine.algebra import fenced
+from .column import Column, Options
+from .gradient.mode_sum import ModeSum, mode_sum
+from .method.adding import Emission, Top, emitting_ground
+from .method.azimuth import (
     Directions,
     LegendreTables,
     azimuthal_mean,
@@ -18,19 +19,18 @@ from .azimuth import (
     legendre_tables,
     weighted_moments,
 )
-from .bordered import Bordered, Vector
-from .column import Column, Options
-from .delta_m import ScaledLayers, unscaled
-from .delta_m import delta_m as scale_delta_m
-from .doublings import layer_doublings, within_reach
-from .ground import black, isotropic, lambertian, reflecting
-from .legendre import legendre_series
-from .single_scatter import (
+from .method.bordered import Bordered, Vector
+from .method.delta_m import ScaledLayers, unscaled
+from .method.delta_m import delta_m as scale_delta_m
+from .method.doublings import layer_doublings, within_reach
+from .method.ground import black, isotropic, lambertian, reflecting
+from .method.legendre import legendre_series
+from .method.single_scatter import (
     cos_scattering_angle,
     direct_transmission,
     exact_single_scattering,
 )
-from .surface import AnySurface
+from .method.surface import AnySurface
 
 
 class Emerging(NamedTuple):

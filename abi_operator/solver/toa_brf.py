@@ -6,8 +6,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .column import Column, Options, promoted
 from .door import prepare, solve
+from .method.surface import AnySurface
 from .program import emerging
-from .surface import AnySurface
 
 
 def toa_brf(

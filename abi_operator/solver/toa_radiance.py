@@ -6,8 +6,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .column import Column, Options, promoted
 from .door import prepare, solve
+from .method.surface import AnySurface
 from .program import emerging
-from .surface import AnySurface
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
 _LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5

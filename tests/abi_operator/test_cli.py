@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 from abi_operator import __version__, cli, scene, simulation
 from abi_operator.demo import write_demo
 from abi_operator.files import InputError, read_result
+from abi_operator.machine.speed import default_cache_folder, usable_cores
 from abi_operator.nomenclature import QUALITY_FLAGS
-from abi_operator.speed import default_cache_folder, usable_cores
 
 SIZE = 8
 
@@ -459,18 +459,19 @@ def test_it_says_its_version_and_helps(invoke):
 PROCESS = """
 import os, sys
 import jax
-from abi_operator import _kept, _processor, cli
+from abi_operator import cli
+from abi_operator.machine import kept, processor
 sys.argv = ["abi-operator", *sys.argv[1:]]
 try:
     cli.main()
 except SystemExit as end:
     assert end.code == 2
-bits = _processor.vector_bits()
+bits = processor.vector_bits()
 assert bits is None or f"--xla_cpu_prefer_vector_width={bits} " in os.environ["XLA_FLAGS"]
 assert "--xla_backend_extra_options=" in os.environ["XLA_FLAGS"]
 assert jax.config.jax_num_cpu_devices == -1
 folder = jax.config.jax_compilation_cache_dir
-assert str(_kept._folder) == str(folder)
+assert str(kept._folder) == str(folder)
 print(folder)
 """
 

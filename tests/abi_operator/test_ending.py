@@ -43,7 +43,7 @@ import sys, threading, time
 sys.argv = ["abi-operator"]
 import jax
 import jax.numpy as jnp
-from abi_operator._lanes import lanes
+from abi_operator.machine.lanes import lanes
 from abi_operator.files import output_folder
 
 def many(x):

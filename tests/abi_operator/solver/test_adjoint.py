@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 from surfaces import Bowl
 
-from abi_operator._numerics import Rows
+from abi_operator.machine.algebra import Rows
 from abi_operator.solver import toa_brf
-from abi_operator.solver.adjoint import ModeSum, mode_sum, reflectance_and_gradient
-from abi_operator.solver.azimuth import (
+from abi_operator.solver.gradient.layer import climb
+from abi_operator.solver.gradient.mode_sum import ModeSum, mode_sum, reflectance_and_gradient
+from abi_operator.solver.gradient.room import Keeper
+from abi_operator.solver.method.azimuth import (
     Directions,
     azimuthal_mean,
     higher_modes,
     legendre_tables,
     weighted_moments,
 )
-from abi_operator.solver.bordered import Bordered
-from abi_operator.solver.delta_m import ScaledLayers
-from abi_operator.solver.doublings import Doublings, layer_doublings
-from abi_operator.solver.ground import lambertian, reflecting
-from abi_operator.solver.layer_adjoint import climb
-from abi_operator.solver.room import Keeper
+from abi_operator.solver.method.bordered import Bordered
+from abi_operator.solver.method.delta_m import ScaledLayers
+from abi_operator.solver.method.doublings import Doublings, layer_doublings
+from abi_operator.solver.method.ground import lambertian, reflecting
 
 # Both ways sum some 1e4 products, in different orders; relative to a column's largest slope.
 AGREE = 1e-11

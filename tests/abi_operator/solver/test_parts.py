@@ -5,22 +5,23 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator._batching import map_tiles
-from abi_operator._elimination import inverse, solve
-from abi_operator._numerics import Entry, fenced, matmul, safe_divide, safe_sqrt
+from abi_operator._numerics import safe_divide, safe_sqrt
+from abi_operator.machine.algebra import Entry, fenced, matmul
+from abi_operator.machine.batching import map_tiles
+from abi_operator.machine.elimination import inverse, solve
 from abi_operator.solver import double_gauss, sufficient_doublings
-from abi_operator.solver.bordered import Bordered, Vector
-from abi_operator.solver.delta_m import delta_m
-from abi_operator.solver.doublings import (
+from abi_operator.solver.method.bordered import Bordered, Vector
+from abi_operator.solver.method.delta_m import delta_m
+from abi_operator.solver.method.doublings import (
     _REACH,
     Doublings,
     layer_doublings,
     start_coefficient,
     unknown_doublings,
 )
-from abi_operator.solver.layer import half_layer
-from abi_operator.solver.legendre import associated_legendre, legendre_series
-from abi_operator.solver.quotient import minus_and_quotient, minus_quotient
+from abi_operator.solver.method.layer import half_layer
+from abi_operator.solver.method.legendre import associated_legendre, legendre_series
+from abi_operator.solver.method.quotient import minus_and_quotient, minus_quotient
 
 REACH_ERROR = 2e-12  # what `doublings` promises, and rounding
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.solver.slant_path import slant_path_secant
+from abi_operator.solver.method.slant_path import slant_path_secant
 
 RADIUS = 6371e3  # [m]
 HEIGHT = np.array([60e3, 20e3, 12e3, 11.9e3, 3e3, 1e3, 250.0])  # [m]

@@ -10,7 +10,8 @@ from cdisort import cdisort_brf
 from columns import STANDARD, simple_columns, standard_columns
 from programs import programs_anew
 
-from abi_operator.solver import doublings, toa_brf
+from abi_operator.solver import toa_brf
+from abi_operator.solver.method import doublings
 
 # A few hundred products and inverses of well-conditioned matrices.
 ROUNDING = 1e-12

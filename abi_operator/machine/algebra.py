@@ -1,0 +1,246 @@
+"""Divisions and roots with a finite derivative everywhere, and small-matrix algebra.
+
+Matrices have their two axes first and the batch last, ``"row col *batch"``: with no batch a
+function reads as the algebra of one column, with one it is arithmetic on long contiguous vectors,
+which is what a CPU is fast at when matrices are small.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.experimental.xla_metadata import set_xla_metadata
+from jaxtyping import Array, Float, Int
+
+_WRITTEN_OUT = 16  # longest sum of a matrix product that is written out
+_IN_PARTS = range(5, 9)  # such sums are two operations in float32
+
+
+def converted(x: Any, dtype: Any) -> Any:
+    """An array of a floating type; one that is of it already is returned as it is.
+
+    JAX would convert it all the same, and linearise that wherever a derivative is taken.
+    """
+    x = x if isinstance(x, jax.Array) else np.asarray(x)
+    if x.dtype == dtype and not getattr(x, "weak_type", False):
+        return x
+    return x.astype(dtype)
+
+
+def fenced(function: Callable) -> Callable:
+    """Compile `function` as a kernel of its own inside a larger program.
+
+    XLA fuses chains of written-out matrix products and then recomputes their parts, which makes a
+    layer several times slower. A call that is not inlined stops it, and derivatives and `vmap`
+    pass through; `jax.lax.optimization_barrier` is dropped before fusion on the CPU. Every
+    `jax.jit` inside becomes such a call, too, also those in JAX's own functions. An `Entry` among
+    the arguments reaches `function` as an array.
+    """
+    compiled = jax.jit(_reading(function))
+
+    @wraps(function)
+    def call(*args):
+        # As arguments, Python's numbers would be of double precision.
+        arrays = [x for x in jax.tree.leaves(args) if not isinstance(x, float)]
+        dtype = jnp.result_type(*(x for x in arrays if jnp.issubdtype(x.dtype, jnp.floating)))
+        args = jax.tree.map(lambda x: jnp.asarray(x, dtype) if isinstance(x, float) else x, args)
+        with set_xla_metadata(inlineable="false"):
+            return compiled(*args)
+
+    return call
+
+
+class Entry(eqx.Module):
+    """One entry of a stack, given to a kernel that reads it in its place, without a copy.
+
+    Parameters
+    ----------
+    stack
+        Entries in one row each.
+    place
+        Number of the entry.
+    shape
+        Of the entry.
+    """
+
+    stack: Float[Array, "entry number"]
+    place: Int[Array, ""]
+    shape: tuple[int, ...] = eqx.field(static=True)
+
+    def read(self) -> Array:
+        """The entry as an array."""
+        # Not `jax.lax.dynamic_index_in_dim`: a fence is passed on to all that is a `jax.jit`.
+        start = self.place, jnp.zeros_like(self.place)
+        return jax.lax.dynamic_slice(self.stack, start, (1, self.stack.shape[1])).reshape(
+            self.shape
+        )
+
+
+def is_entry(x: Any) -> bool:
+    """Whether it is an entry of a stack, for `jax.tree`'s `is_leaf`."""
+    return isinstance(x, Entry)
+
+
+def as_array(x: Any) -> Any:
+    """The same, read if it is an entry of a stack."""
+    return x.read() if isinstance(x, Entry) else x
+
+
+def _reading(function: Callable) -> Callable:
+    """`function` of arrays, some of which may be entries of a stack."""
+
+    @wraps(function)
+    def read(*args):
+        return function(*jax.tree.map(as_array, args, is_leaf=is_entry))
+
+    return read
+
+
+class Rows(eqx.Module):
+    """A matrix in blocks of rows, as an elimination leaves it: to join them takes a copy."""
+
+    blocks: tuple[Float[Array, "_ col *batch"], ...]
+
+    def joined(self) -> Float[Array, "row col *batch"]:
+        """As one array."""
+        return self.blocks[0] if len(self.blocks) == 1 else jnp.concatenate(self.blocks)
+
+
+def product(
+    a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"] | Rows
+) -> Array:
+    """Matrix product, batch last and broadcast, for use inside a kernel.
+
+    A short sum over `inner` is written out: a chain of fused multiply-adds on whole batches, five
+    to ten times faster than a batched ``dot`` on matrices of 2 to 8 rows. From 16 on the ``dot`` is
+    faster, and written-out sums would take minutes to compile. In float32 sums of 5 to 8 terms come
+    in two operations, neither of which has more arithmetic than bytes: what that is good for stands
+    in `kernels.one_kernel`.
+    """
+    inner = a.shape[1]
+    if inner > _WRITTEN_OUT:
+        b = b.joined() if isinstance(b, Rows) else b
+        return jnp.einsum("ik...,kj...->ij...", a, b, precision=jax.lax.Precision.HIGHEST)
+    if inner in _IN_PARTS and a.dtype == jnp.float32:
+        return total([_first_half(a, b), *_terms(a, b)[inner // 2 :]])
+    return total(_terms(a, b))
+
+
+def _terms(a, b):
+    blocks = b.blocks if isinstance(b, Rows) else (b,)
+    rows = [block[k] for block in blocks for k in range(block.shape[0])]
+    return [a[:, k, None] * row[None] for k, row in enumerate(rows)]
+
+
+@fenced
+def _first_half(a, b):
+    return total(_terms(a, b)[: a.shape[1] // 2])
+
+
+def kernel_of_product(function: Callable, inner: int) -> Callable:
+    """`function` as a kernel of its own if the products in it are written out.
+
+    A ``dot`` is a kernel by itself, and no part of any other.
+    """
+    return fenced(function) if inner <= _WRITTEN_OUT else _reading(function)
+
+
+def matmul(
+    a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"] | Rows
+) -> Array:
+    """Matrix product, batch last and broadcast, as a kernel of its own."""
+    return kernel_of_product(product, a.shape[1])(a, b)
+
+
+def weighted(terms: Sequence[tuple[Array | float, Array]]) -> Array:
+    """Sum of arrays times weights."""
+    total, *others = [weight * array for weight, array in terms]
+    for term in others:
+        total = total + term
+    return total
+
+
+def weighted_rows(weights: Sequence[float | Float[Array, "..."]], arrays: Sequence[Array]) -> Array:
+    """Weighted sum of arrays ``... col *batch`` as a kernel of its own, in long rows.
+
+    A loop over 32 columns with as little in it as this LLVM unrolls, number by number, before it
+    could make vectors of it; not so where all that lies in a row is one axis.
+    """
+    shape = arrays[0].shape
+    batches = [jnp.ndim(w) for w in weights if not isinstance(w, float)]
+    if not batches:
+        return _weighted(weights, [x.reshape(-1) for x in arrays]).reshape(shape)
+    col = len(shape) - max(batches) - 1
+    rows = [x.reshape(*shape[:col], -1) for x in arrays]
+    along = [w if isinstance(w, float) else _along(w, shape[col]) for w in weights]
+    return _weighted(along, rows).reshape(shape)
+
+
+def _along(weight, count):
+    if count == 1:
+        return weight.reshape(-1)
+    return fenced(lambda w: jnp.broadcast_to(w, (count, *w.shape)).reshape(-1))(weight)
+
+
+@fenced
+def _weighted(weights, arrays):
+    return weighted(list(zip(weights, arrays, strict=True)))
+
+
+def total(terms: Any) -> Array:
+    """Sum over the first axis, inside a kernel, which a reduction would cut in two."""
+    result = terms[0]
+    for k in range(1, len(terms)):
+        result = result + terms[k]
+    return result
+
+
+def minus_product(
+    terms: Sequence[tuple[Array | float, Array]],
+    factor: Array,
+    a: Float[Array, "row inner *batch"],
+    b: Float[Array, "inner col *batch"] | Rows,
+) -> Float[Array, "row col *batch"]:
+    """Weighted sum of matrices minus `factor` times a product, in one pass over all of them."""
+    return kernel_of_product(_minus_product, a.shape[1])(terms, factor, a, b)
+
+
+def _minus_product(terms, factor, a, b):
+    return weighted(terms) - factor * product(a, b)
+
+
+def weighted_sum(
+    matrices: Float[Array, "*shape term"],
+    weights: Float[Array, "term *batch"],
+    more: Float[Array, "*shape"] | None = None,
+) -> Array:
+    """Sum of arrays that all columns share, weighted column by column: ``*shape *batch``.
+
+    `more` is one more such array, of weight 1.
+    """
+    expand = (...,) + (None,) * (weights.ndim - 1)
+    result: Any = None if more is None else more[expand]
+    if weights.shape[0] > _WRITTEN_OUT:
+        summed = jnp.tensordot(matrices, weights, axes=1)
+        return summed if result is None else result + summed
+    # Few terms at a time: `kernels.one_kernel` asks for no more arithmetic than bytes in each.
+    terms = 2 if weights.dtype == jnp.float32 else 4
+    for k in range(0, weights.shape[0], terms):
+        result = _add_weighted_sum(result, matrices[..., k : k + terms], weights[k : k + terms])
+    return result
+
+
+@fenced
+def _add_weighted_sum(result, matrices, weights):
+    expand = (...,) + (None,) * (weights.ndim - 1)
+    terms = [(matrices[..., k][expand], weights[k]) for k in range(weights.shape[0])]
+    return weighted(terms if result is None else [(1.0, result), *terms])
+
+
+def transpose(a: Float[Array, "row col *batch"]) -> Float[Array, "col row *batch"]:
+    """Transpose, batch last."""
+    return jnp.swapaxes(a, 0, 1)

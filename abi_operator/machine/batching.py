@@ -1,0 +1,158 @@
+"""Which layout runs at which size.
+
+Kernels have their batch last and work on one tile of columns at a time, small enough that the
+matrices of a layer stay in the cache and large enough to fill the vector units
+(`benchmarks/layout.py` measures it).
+
+XLA runs the loop over tiles on one core: its loops share their temporary memory and so follow each
+other, however a program is written. It does run several CPU devices at a time, and where JAX has
+more than one (``JAX_NUM_CPU_DEVICES=4``, before JAX is first used) every device takes its share of
+the tiles, under any transformation. What comes back then lies on all of them. Not so where the
+caller settles what runs where: by `jax.default_device`, a mesh, or several processes.
+
+Where a batch divides evenly, it is divided as it comes, before anything is done to it
+(`on_every_device`): each device then copies and transposes its own columns and nothing is
+exchanged. Left to XLA, to pad, transpose and cut an array of which each device holds a part takes a
+few dozen exchanges, as long as some hundred columns of 4 streams.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jaxtyping import Array
+
+# A vector unit holds at most so many float64; tiles narrower than a few of these leave it idle.
+_VECTOR = 8
+_FEWEST_A_DEVICE = 4 * _VECTOR
+# A GPU has no cache to keep a tile in, but many units to fill; this bounds its memory alone.
+_GPU_TILE = 4096
+
+
+def tile_size(num_streams: int, dtype: Any) -> int:
+    """Columns that are solved together, at most.
+
+    The fewer, the more of a layer is in the cache next to the processor; the more, the less the
+    start of a kernel counts; below 64 LLVM unrolls short loops over them number by number, without
+    vectors (`algebra.weighted_rows` has what was done about it). Where a layer is one kernel
+    (`kernels`) a tile is also small enough for that.
+    """
+    if jax.default_backend() != "cpu":
+        return _GPU_TILE
+    single = jnp.dtype(dtype) == jnp.float32
+    if num_streams > 16:
+        return 64 if single else 32
+    return 128 if single and num_streams > 8 else 64
+
+
+def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
+    """Apply a batch-last `function` to a pytree of arrays tile by tile, on every CPU device.
+
+    Parameters
+    ----------
+    function
+        Maps a pytree of arrays whose last axis is the batch to another such.
+    columns
+        Its argument; all leaves have the same last axis. Tiles are equally wide: the last is filled
+        up with copies of the last column, whose results are dropped.
+    tile
+        Columns a tile, at most.
+    """
+    size = jax.tree.leaves(columns)[0].shape[-1]
+    devices = _devices(size)
+    count, width = _equal_tiles(size, tile, len(devices))
+    if count == 1:
+        return function(columns)
+
+    # Columns are cut into tiles while their axis is the first, as callers give them, and turned
+    # one tile at a time, in the cache: XLA drops what turns all of them to and fro.
+    def tiled(x: Array) -> Array:
+        padding = [(0, count * width - size)] + [(0, 0)] * (x.ndim - 1)
+        first = jnp.pad(jnp.moveaxis(x, -1, 0), padding, mode="edge")
+        return first.reshape(count, width, *first.shape[1:])
+
+    def joined(x: Array) -> Array:
+        return jnp.moveaxis(x.reshape(count * width, *x.shape[2:])[:size], 0, -1)
+
+    def of_tile(columns: Any) -> Any:
+        result = function(jax.tree.map(lambda x: jnp.moveaxis(x, 0, -1), columns))
+        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), result)
+
+    def mapped(tiles: Any) -> Any:
+        # Reverse mode computes a tile again when its turn comes: its memory is that of a tile.
+        return jax.lax.map(jax.checkpoint(of_tile), tiles)
+
+    if len(devices) > 1:
+        mapped = _divided(mapped, devices, _SHARE)
+    return jax.tree.map(joined, mapped(jax.tree.map(tiled, columns)))
+
+
+def on_every_device(function: Callable[[Any], Any], columns: Any, divided: Sequence[bool]) -> Any:
+    """Apply a batch-first `function`, whose columns do not mix, to a share on every CPU device.
+
+    Parameters
+    ----------
+    function
+        Maps a pytree of arrays to another, in all of which the batch's first axis is the first.
+    columns
+        Its argument.
+    divided
+        Whether the first axis of each of its leaves is the batch's first. Others all columns share.
+    """
+    leaves, structure = jax.tree.flatten(columns)
+    sizes = {x.shape[0] for x, own in zip(leaves, divided, strict=True) if own}
+    size = sizes.pop() if len(sizes) == 1 else 0
+    devices = _devices(size)
+    if len(devices) == 1 or size % len(devices):
+        return function(columns)
+    specs = [_SHARE if own else PartitionSpec() for own in divided]
+    return _divided(function, devices, jax.tree.unflatten(structure, specs))(columns)
+
+
+def announced(arrays: Sequence[Array], size: int) -> list[Array]:
+    """The same arrays, of `size` columns, which tell `jax.jit` that every CPU device takes a share.
+
+    Where columns are divided by an operation that is not traced inside until it is compiled,
+    `jax.jit` would not find the devices by itself.
+    """
+    devices = _devices(size)
+    given = list(arrays)
+    if len(devices) > 1:
+        everywhere = NamedSharding(Mesh(np.asarray(devices), ("device",)), PartitionSpec())
+        smallest = min(range(len(given)), key=lambda k: given[k].size)
+        given[smallest] = jax.lax.with_sharding_constraint(given[smallest], everywhere)
+    return given
+
+
+_SHARE = PartitionSpec("device")
+
+
+def _divided(function: Callable[[Any], Any], devices: list[Any], shares: Any) -> Any:
+    """`function` of shares of its argument, each on its device."""
+    mesh = Mesh(np.asarray(devices), ("device",))
+    # Nothing is exchanged between the devices, so there is nothing to check.
+    return jax.shard_map(function, mesh=mesh, in_specs=(shares,), out_specs=_SHARE, check_vma=False)
+
+
+def _devices(size: int) -> list[Any]:
+    """CPU devices that so many columns occupy and this program may use; one stands for any."""
+    devices = jax.local_devices()
+    settled = (
+        jax.config.jax_default_device is not None  # pyright: ignore[reportAttributeAccessIssue]
+        or not jax.sharding.get_abstract_mesh().empty
+        or jax.process_count() > 1
+    )
+    few = size < _FEWEST_A_DEVICE * len(devices)
+    return devices[:1] if settled or few or devices[0].platform != "cpu" else devices
+
+
+def _equal_tiles(size: int, tile: int, num_devices: int) -> tuple[int, int]:
+    """Number of tiles, the same for every device, and their width: as narrow as the number lets."""
+    share = math.ceil(size / num_devices)
+    count = max(1, math.ceil(share / tile))
+    width = min(tile, _VECTOR * math.ceil(share / count / _VECTOR))
+    return count * num_devices, width

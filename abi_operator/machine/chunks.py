@@ -1,0 +1,286 @@
+"""Columns with values, in chunks of a few sizes and on every core.
+
+XLA compiles a program for one number of columns and runs it on one core. Where columns can be read
+(not under `jax.jit`) and live on a CPU, they are cut into chunks of one of a program's `widths`, as
+they lie in memory, and threads take one after the other. So a program is compiled for these sizes
+and for no other number of columns, whatever comes; and nothing has to be set before JAX starts.
+The last chunk of a size begins where it must to end with the last column: some columns are solved
+twice, but none is copied. Fewer columns than the smallest chunk has are filled up with copies.
+
+Values are waited for. Slopes are not where there is a chunk for each core at most (`begin_chunks`):
+they are JAX's own results then, of programs that may still run. To put these together takes one
+more small program for every number of columns, which values do without.
+
+How they are compiled is settled in `compiler`.
+"""
+
+import gc
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from threading import Lock
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Array
+
+from .lanes import lanes, parted, threads
+from .listening import compiling, tell_solved
+from .processor import usable_cores
+
+_ALIGNMENT = 64  # bytes
+
+# What has been compiled: of several threads with a new program each would compile it.
+_compiled: set[Any] = set()
+
+
+def can_be_cut(arrays: Sequence[Any]) -> bool:
+    """Whether columns lie on one CPU device, and nobody settles what runs where."""
+    settled = (
+        jax.default_backend() != "cpu"
+        or jax.config.jax_default_device is not None  # pyright: ignore[reportAttributeAccessIssue]
+        or not jax.sharding.get_abstract_mesh().empty
+        or jax.process_count() > 1
+    )
+    return not settled and all(len(x.devices()) == 1 for x in arrays if isinstance(x, jax.Array))
+
+
+def map_chunks(
+    function: Callable[[list[Array]], Any],
+    key: Any,
+    arrays: Sequence[Any],
+    own: Sequence[bool],
+    batch: tuple[int, ...],
+    widths: Sequence[int],
+) -> Any:
+    """Apply a compiled, batch-first `function` whose columns do not mix to chunks of columns.
+
+    Parameters
+    ----------
+    function
+        Of a list of arrays with the columns of a chunk on the first axis, or one for all where the
+        columns share it, to a pytree of arrays with the columns on the first axis.
+    key
+        What the function is compiled for, beside the shapes.
+    arrays
+        What it is applied to.
+    own
+        Which of them have an entry for each column.
+    batch
+        Shape that the batch has outside; one column or more.
+    widths
+        Numbers of columns of a chunk that it may be compiled for, rising.
+
+    Returns
+    -------
+    The results of all columns, in one array each, with the batch in its shape: the function's own
+    where there is one chunk of just these columns, else NumPy's, which JAX takes without a copy.
+    """
+    columns = _Columns(function, key, arrays, own, math.prod(batch))
+    chunks = cut(columns.size, widths, usable_cores())
+    whole = len(chunks) == 1 and batch == (chunks[0][1],)
+    results = _Results(columns.size)
+
+    def finish(chunk: tuple[int, int], found: Any) -> Any:
+        jax.block_until_ready(found)
+        tell_solved(min(chunk[1], columns.size - chunk[0]))
+        return found if whole else results.put(chunk[0], found)
+
+    def solve(chunk: tuple[int, int]) -> Any:
+        return finish(chunk, columns.begin(chunk[1], columns.of(*chunk)))
+
+    if len(chunks) <= len(lanes()):
+        begun = _on_lanes(columns, chunks, columns.of)
+        found = [finish(*pair) for pair in zip(chunks, begun, strict=True)]
+    else:
+        new = [c for c in _first_of_each(chunks) if not columns.known(c[1])]
+        found = [threads().submit(solve, c).result() for c in new]
+        found += threads().map(solve, [c for c in chunks if c not in new])
+    return found[0] if whole else results.shaped(batch)
+
+
+def begin_chunks(
+    function: Callable[[list[Array]], Any],
+    key: Any,
+    arrays: Sequence[Any],
+    own: Sequence[bool],
+    batch: tuple[int, ...],
+    widths: Sequence[int],
+) -> tuple[tuple[int, ...], list[Any]] | None:
+    """Begin what `map_chunks` does, without waiting; None where cores have several chunks each.
+
+    Columns are copied: JAX reads NumPy's arrays in their place, and what the caller writes there
+    while chunks are solved is none of their business.
+
+    Returns
+    -------
+    Number of columns that are to be taken of each chunk, from its first on, and the results of the
+    chunks, which may still be computed.
+    """
+    columns = _Columns(function, key, arrays, own, math.prod(batch))
+    chunks = cut(columns.size, widths, usable_cores())
+    if len(chunks) > len(lanes()):
+        return None
+    found = _on_lanes(columns, chunks, lambda *chunk: _copied(columns.of(*chunk)))
+    ends = [start for start, _ in chunks[1:]] + [columns.size]
+    counts = tuple(end - start for (start, _), end in zip(chunks, ends, strict=True))
+    return counts, found
+
+
+def _on_lanes(
+    columns: "_Columns",
+    chunks: Sequence[tuple[int, int]],
+    given: Callable[[int, int], list[np.ndarray]],
+) -> list[Any]:
+    """Results of a chunk for each core at most, which may still be computed.
+
+    Never begun in this thread: what it is in the middle of, such as a `jax.vmap` of derivatives,
+    would be part of what JAX knows a compiled program by.
+    """
+    begun: list[Any] = []
+    with parted():
+        for lane, chunk in zip(lanes(), chunks, strict=False):
+            known = columns.known(chunk[1])
+            begun.append(lane.submit(columns.begin, chunk[1], given(*chunk)))
+            if not known:
+                begun[-1].result()  # compiled once, for so few chunks have one width
+        return [x.result() for x in begun]
+
+
+class _Columns:
+    """Columns in memory, chunks of which a compiled function is called with."""
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        key: Any,
+        arrays: Sequence[Any],
+        own: Sequence[bool],
+        size: int,
+    ) -> None:
+        self._function, self._own, self.size = function, own, size
+        self._host = [np.asarray(x) for x in arrays]
+        shapes = tuple(x.shape[each:] for x, each in zip(self._host, own, strict=True))
+        self._x64 = jax.dtypes.canonicalize_dtype(np.float64) == np.float64
+        self._device = jax.local_devices()[0]
+        self._key = key, shapes, self._x64
+
+    def known(self, width: int) -> bool:
+        """Whether the function has been compiled for so many."""
+        return (*self._key, width) in _compiled
+
+    def of(self, start: int, width: int) -> list[np.ndarray]:
+        """Arrays of so many columns; those after the last are copies of it."""
+        end = start + width
+        place: Any = slice(start, end)
+        if end > self.size:
+            place = np.minimum(np.arange(start, end), self.size - 1)
+        pairs = zip(self._host, self._own, strict=True)
+        return [x[place] if each else x for x, each in pairs]
+
+    def begin(self, width: int, some: list[np.ndarray]) -> Any:
+        """Call the function with arrays of so many columns."""
+        known = self.known(width)
+        # Settings of the caller's thread, not of this one.
+        settings = jax.enable_x64(self._x64), jax.default_device(self._device)
+        with settings[0], settings[1], nullcontext() if known else _first_call():
+            found = self._function(some)
+        if not known:
+            _compiled.add((*self._key, width))
+        return found
+
+
+def cut(size: int, widths: Sequence[int], num_cores: int) -> list[tuple[int, int]]:
+    """Start and width of each chunk.
+
+    Large chunks, as many on every core; smaller ones for what is left, so that cores end together.
+    """
+    *smaller, largest = widths
+    if not smaller or size == largest:
+        return _evenly(0, size, largest)
+    share = size // (largest * num_cores) * num_cores * largest
+    if size - share > largest * num_cores - smaller[-1]:
+        share = size  # no more columns twice than a small chunk has
+    chunks = _evenly(0, share, largest) if share else []
+    rest = size - share
+    if rest == 0:
+        return chunks
+    fitting = [w for w in smaller if w >= rest]
+    if fitting:
+        return [*chunks, (max(0, size - fitting[0]), fitting[0])]
+    return chunks + _evenly(share, rest, smaller[-1])
+
+
+def _evenly(start: int, count: int, width: int) -> list[tuple[int, int]]:
+    """Chunks of one width for `count` columns from `start` on."""
+    number = -(-count // width)
+    end = start + count
+    return [(max(0, min(start + k * width, end - width)), width) for k in range(number)]
+
+
+def _first_of_each(chunks: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    return list({width: (start, width) for start, width in reversed(chunks)}.values())
+
+
+@contextmanager
+def _first_call() -> Iterator[None]:
+    """A call that compiles, or reads a program from the disk."""
+    with compiling(), _no_search_for_garbage():
+        yield
+
+
+@contextmanager
+def _no_search_for_garbage() -> Iterator[None]:
+    """Tracing makes many small objects that stay; to search for others takes part of its time."""
+    searching = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if searching:
+            gc.enable()
+
+
+class _Results:
+    """Arrays of all columns, into which each chunk is copied by the thread that has solved it."""
+
+    def __init__(self, size: int) -> None:
+        self._size, self._lock = size, Lock()
+        self._arrays: list[np.ndarray] = []
+        self._structure: Any = None
+
+    def put(self, start: int, found: Any) -> None:
+        parts, structure = jax.tree.flatten(found)
+        with self._lock:
+            if self._structure is None:
+                self._arrays = [_aligned((self._size, *x.shape[1:]), x.dtype) for x in parts]
+                self._structure = structure
+        for array, part in zip(self._arrays, parts, strict=True):
+            array[start : start + len(part)] = np.asarray(part)[: self._size - start]
+
+    def shaped(self, batch: tuple[int, ...]) -> Any:
+        arrays = [x.reshape((*batch, *x.shape[1:])) for x in self._arrays]
+        return jax.tree.unflatten(self._structure, arrays)
+
+
+def _copied(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Copies that JAX takes as they are, in one piece of memory, which takes half the time."""
+    places, first = [], 0
+    for x in arrays:
+        places.append(slice(first, first + x.nbytes))
+        first += -(-x.nbytes // _ALIGNMENT) * _ALIGNMENT
+    memory = _aligned((first,), np.dtype(np.uint8))
+    pairs = zip(arrays, places, strict=True)
+    copies = [memory[place].view(x.dtype).reshape(x.shape) for x, place in pairs]
+    for own, x in zip(copies, arrays, strict=True):
+        own[...] = x
+    return copies
+
+
+def _aligned(shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+    """An array that JAX takes as it is, which one is that begins where XLA's own do."""
+    count = math.prod(shape) * dtype.itemsize
+    memory = np.empty(count + _ALIGNMENT, np.uint8)
+    first = -memory.ctypes.data % _ALIGNMENT
+    return memory[first : first + count].view(dtype).reshape(shape)

@@ -1,0 +1,58 @@
+"""Which of XLA's ways of compiling serve this package, where the user has not chosen them.
+
+Vectors as wide as the processor has them: a solve gains about a third. The older of XLA's two ways
+from a fusion to LLVM: a solve's kernels hold some hundred fusions each, which the newer one
+optimises one by one before LLVM does it all again. Loops that are not unrolled. With both there is
+a third less to compile, and programs run as fast: compare ``time abi-operator --no-cache demo``
+with the same under
+
+    XLA_FLAGS="--xla_cpu_use_fusion_emitters=true --xla_backend_extra_options=xla_none=false"
+
+The last is no option of `jax.jit`: programs that are called with values do without it, and a
+process of its own has it in ``XLA_FLAGS`` (`speed`).
+"""
+
+import os
+import re
+
+from .processor import vector_bits
+
+_WIDTH, _EMITTERS = "xla_cpu_prefer_vector_width", "xla_cpu_use_fusion_emitters"
+
+# XLA passes over names in xla_ here that it does not know; other flags would end the process.
+_EXTRA = "xla_backend_extra_options"
+_LEAN = "xla_cpu_disable_new_fusion_emitters=true,xla_cpu_disable_loop_unrolling=true"
+
+
+def options() -> dict[str, int | bool]:
+    """Options of `jax.jit`."""
+    found: dict[str, int | bool] = {_EMITTERS: False}
+    bits = vector_bits()
+    if bits is not None:
+        found[_WIDTH] = bits
+    return {name: value for name, value in found.items() if not _is_chosen(name)}
+
+
+def use_flags() -> None:
+    """Put them into ``XLA_FLAGS``, which XLA reads when JAX starts and child processes inherit."""
+    flags = [os.environ.get("XLA_FLAGS", "")]
+    if vector_bits() is not None and not _is_chosen(_WIDTH):
+        flags.append(f"--{_WIDTH}={vector_bits()}")
+    if not _is_chosen(_EXTRA):
+        flags.append(f"--{_EXTRA}={_LEAN}")
+    os.environ["XLA_FLAGS"] = " ".join(flags).strip()
+
+
+def chosen_bits() -> int | None:
+    """Width of vectors that ``XLA_FLAGS`` asks for. [bit]"""
+    return number_of(_WIDTH)
+
+
+def number_of(flag: str) -> int | None:
+    """Number that ``XLA_FLAGS`` gives an option; of several, XLA takes the last."""
+    found = re.findall(rf"--{flag}=(\d+)", os.environ.get("XLA_FLAGS", ""))
+    return int(found[-1]) if found else None
+
+
+def _is_chosen(name: str) -> bool:
+    return f"--{name}" in os.environ.get("XLA_FLAGS", "")

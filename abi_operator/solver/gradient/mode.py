@@ -1,0 +1,159 @@
+r"""One mode's reflection and its slopes: one pass up the layers, one down.
+
+At the top :math:`F_i = (1+Y)^{-1} e_i` for sun and view, and the reflection's derivative is
+-pair(F)/2 in Y. Going down through a layer of half thickness h, with the quotient of its adding
+step (`adding`) :math:`N = S^{-1}(Y + Y_e)F`,
+
+.. math:: \sigma = F - hN/2, \qquad F' = F - hN,
+
+the cotangent of Y_e is P = 2 pair(sigma), that of Z is hQ with Q = pair(N)/2, and F' are the fields
+below. A doubling with quotient R is undone by
+
+.. math::
+   Q \leftarrow 2Q + 2(R\otimes R)P, \qquad P \leftarrow 2P - 2h(R\oplus R)P + h^2Q,
+
+or, as long as fields are fewer than nodes, by those of its halves,
+:math:`\sigma - hR\sigma \pm hN/2` and :math:`N \pm 2R\sigma` (`fields.cotangents`). At the start
+(`method.layer.half_layer`), with :math:`U = Z^{-1}A`, :math:`W = Z^{-1}C`,
+:math:`V = (5B^{-1} + dh^2A)^{-1}A` and :math:`M = (U\otimes W + W\otimes U)P/2`,
+
+.. math::
+   \bar Z &= Q - (U\oplus U)P/2 + h^2M, \\
+   \bar A &= P - h^2(W\oplus W)P/2
+       + h^2[1/3 - \tfrac{h^2}{9}(V\oplus V) + \tfrac{dh^4}{9}V\otimes V]\bar Z, \\
+   \bar B &= -(B^{-1}\otimes B^{-1})[Q + h^2M + \tfrac{5h^4}{9}(V\otimes V)\bar Z],
+
+all over h; the last is never formed (`pull_back.undo_inverse`). A layer depends on hA and hB alone,
+so that its derivative in h is :math:`\langle\bar A, A\rangle + \langle\bar B, B\rangle`.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...machine.algebra import fenced, matmul
+from ...machine.kernels import one_kernel
+from ..method.adding import top
+from ..method.bordered import Bordered
+from ..method.doublings import Doublings
+from ..method.layer import ModeKernels
+from ..method.mode_layers import Layer, Layers, Order, read
+from .fields import Fields, pair
+from .layer import climb, descend
+from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
+from .room import Keeper, Room
+
+Kernels = tuple[ModeKernels, ModeKernels]
+
+
+class Slopes(NamedTuple):
+    """Of one mode, in what its beams are made of and in its ground; of it and those before it, in
+    what all share.
+    """
+
+    shared: "Shared"
+    even_beams: Float[Array, "2 degree *batch"]
+    odd_beams: Float[Array, "2 degree *batch"]
+    ground: Bordered
+
+
+class Shared(NamedTuple):
+    """What all modes depend on, or slopes in it."""
+
+    layers: Layers
+    view_secant: Float[Array, "*batch"]
+
+
+def mode_slopes(
+    shared: Shared,
+    doublings: Doublings,
+    single_scattering: bool,
+    order: Order,
+    kernels: Kernels,
+    ground: Bordered,
+    weight: Float[Array, "*batch"],
+    slopes: Shared,
+    room: Room,
+) -> tuple[Float[Array, "*batch"], Room, Slopes]:
+    """Reflection of a mode, and the slopes of `weight` times it, added to those of other modes.
+
+    The room (`room.Keeper.empty`) is given back filled. Layers are read and written inside the
+    kernels: as inputs and outputs of a scan every array would be one more kernel a layer.
+    """
+    layers, view_secant = shared
+    num_layers, num_nodes = layers.tau.shape[0], layers.moments.shape[1]
+    numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
+    assert doublings.most is not None
+    keeper = Keeper(layers.tau, num_nodes, doublings.most)
+
+    def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
+        # A layer that is the only one fills the room: in the kernel XLA finds no use for its
+        # number, nor for what was in the room (see `one_kernel`).
+        return function if num_layers == 1 else one_kernel(function, num_nodes, **how)
+
+    def put_on_and_keep(stack, room, layers, doublings, number, order, kernels, view_secant):
+        layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
+        a, p = layer.matrices(order.mean, kernels, view_secant, single_scattering)
+        keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
+        stack, new, room = climb(stack, a, p, layer.tau, own, room, keep)
+        return stack, keeper.with_layer(room, new, number)
+
+    put_one = compiled(put_on_and_keep, in_parts=True)
+
+    def up(carry, number):
+        return put_one(*carry, layers, doublings, number, order, kernels, view_secant), None
+
+    (stack, room), _ = jax.lax.scan(up, (ground, room), numbers, reverse=True)
+    reflection, fields = _fields_at_the_top(stack, weight)
+
+    @compiled
+    def undo_one(carry, layers, doublings, room, number, order, kernels, view_secant):
+        fields, totals, slopes = carry
+        layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
+        kept, secants = keeper.layer(room, number), layer.secants(view_secant)
+        # The beams' own entries of the stack are 1 whatever happens in it.
+        fields = fields._replace(other=jnp.zeros_like(fields.other))
+        fields, a_bar, p_bar = descend(
+            fields, layer.tau, secants, kept, own, partial(keeper.doubling, room, number)
+        )
+        a, coalbedo = undo_matrix(
+            kernels[0], layer.even, secants, a_bar, single_scattering, layer.coalbedo, order.mean
+        )
+        b = undo_inverse(kernels[1], layer.odd, kept.b_inverse, p_bar, single_scattering)
+        _, step, _ = own.of_layer()
+        totals, new = _collected(step, layer.tau, totals, a, b, coalbedo)
+        return fields, totals, slopes.plus(number, order.odd, new)
+
+    def down(carry, number):
+        return undo_one(carry, layers, doublings, room, number, order, kernels, view_secant), None
+
+    start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
+    carry, _ = jax.lax.scan(down, (fields, start, slopes.layers), numbers)
+    fields, (even, odd, view), layers = carry
+    return reflection, room, Slopes(Shared(layers, view), even, odd, pair(1.0, [fields]))
+
+
+def _of_layer(doublings: Doublings, number: Array) -> Doublings:
+    return jax.tree.map(lambda x: read(x, number), doublings)
+
+
+def _fields_at_the_top(stack: Bordered, weight):
+    """Reflection, and fields whose pair is the cotangent of `weight` times it."""
+    solved = matmul(top(stack).inverse, stack.border)
+    reflection = 0.5 * (jnp.sum(stack.border[:, 1] * solved[:, 0], axis=0) - stack.corner[0])
+    scale = jnp.stack([jnp.ones_like(weight), -0.5 * weight])
+    return reflection, Fields(-scale * solved, scale, jnp.zeros_like(scale))
+
+
+@fenced
+def _collected(step, tau, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
+    """Totals over the layers, and the layer's own slopes, from those over h."""
+    h = tau * step
+    secants = h * (a.secants + b.secants)
+    beams = totals[0] + h * a.beams, totals[1] + h * b.beams
+    slopes = Layer(step * (a.h + b.h), h * coalbedo, secants[0], h * a.moments, h * b.moments)
+    return (*beams, totals[2] + secants[1]), slopes

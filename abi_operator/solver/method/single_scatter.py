@@ -1,0 +1,77 @@
+"""Light scattered or reflected once, exactly, and its angle."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..._numerics import safe_sqrt
+
+
+def cos_scattering_angle(
+    mu0: Float[Array, "*#batch"],
+    mu: Float[Array, "*#batch"],
+    relative_azimuth: Float[Array, "*#batch"],
+) -> Float[Array, "*batch"]:
+    r"""Cosine of the angle by which sunlight is turned towards the satellite. [-]
+
+    :math:`\cos\Theta = -\mu\mu_0 - \sqrt{1-\mu^2}\sqrt{1-\mu_0^2}\cos\Delta\phi` with the relative
+    azimuth 0 where sun and satellite stand on the same side; -1 is exact backscatter.
+    """
+    sines = safe_sqrt((1 - mu) * (1 + mu)) * safe_sqrt((1 - mu0) * (1 + mu0))
+    return -mu * mu0 - sines * jnp.cos(relative_azimuth)
+
+
+def exact_single_scattering(
+    tau: Float[Array, "layer *batch"],
+    scattering_ratio: Float[Array, "layer *batch"],
+    phase_function: Float[Array, "layer view *batch"],
+    mu0: Float[Array, "*batch"],
+    mu: Float[Array, "view *batch"],
+    sun_secants: Float[Array, "layer *batch"],
+) -> Float[Array, "view *batch"]:
+    r"""Reflectance of light scattered once (the correction "TMS").
+
+    .. math::
+       \sum_i \frac{\omega_i P_i(\Theta)}{1-\omega_i f_i}\, e^{-\sum_{j<i}s_j\tau'_j}\,
+       \frac{1 - e^{-s_i\tau'_i}}{4\mu\mu_0 s_i}, \qquad s_i = 1/\mu + 1/\mu_{0,i} .
+
+    Parameters
+    ----------
+    tau
+        delta-M scaled optical depths, top first. [-]
+    scattering_ratio
+        omega / (1 - omega f), of the unscaled single-scattering albedo. [-]
+    phase_function
+        Exact phase function at the scattering angle, mean 1 over the sphere. [-]
+    mu0, mu
+        Cosines of sun and views. [-]
+    sun_secants
+        By which the beam is attenuated in each layer: 1 / mu0 in plane-parallel air. [-]
+
+    References
+    ----------
+    .. [1] T. Nakajima and M. Tanaka, "Algorithms for radiative intensity calculations in moderately
+       thick atmospheres using a truncation approximation", J. Quant. Spectrosc. Radiat. Transfer,
+       40, 51-69, 1988, doi:10.1016/0022-4073(88)90031-3
+    """
+    secant = 1 / mu + sun_secants[:, None]
+    slant = secant * tau[:, None]
+    # Summed without the layer itself: taking a thick layer out again would cost its digits. Not by
+    # `jnp.cumsum`, a sum over windows that XLA's CPU backend computes number by number.
+    layers_above = jnp.tri(tau.shape[0], k=-1, dtype=tau.dtype)
+    above = jnp.tensordot(layers_above, slant, axes=1, precision=jax.lax.Precision.HIGHEST)
+    source = scattering_ratio[:, None] * phase_function * jnp.exp(-above)
+    return jnp.sum(source * -jnp.expm1(-slant) / secant, axis=0) / (4 * mu * mu0)
+
+
+def direct_transmission(
+    tau: Float[Array, "layer *batch"],
+    mu: Float[Array, "view *batch"],
+    sun_secants: Float[Array, "layer *batch"],
+) -> Float[Array, "view *batch"]:
+    """Share of the beam that meets nothing from the sun to the ground and on to each view. [-]
+
+    Times the ground's reflectance factor it is light reflected once and never scattered; `tau` is
+    delta-M scaled, so that light scattered into the forward peak counts as unscattered.
+    """
+    return jnp.exp(-jnp.sum((1 / mu + sun_secants[:, None]) * tau[:, None], axis=0))

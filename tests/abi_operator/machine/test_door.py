@@ -1,0 +1,127 @@
+"""The way into a program, with one that takes no time to compile."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator.machine.door import enter
+from abi_operator.machine.slopes import slopes_by_reverse_mode
+
+OWN_AXES = (1, 0, 0)  # a row of each column, a number, an integer
+
+
+class Waves:
+    """Two results of a column: a sum over its row, and a sine."""
+
+    def __init__(self):
+        self.traced = []
+
+    @property
+    def own_axes(self):
+        return OWN_AXES
+
+    def known(self, leaves, what):
+        return self
+
+    def unknown(self, what):
+        return self
+
+    def own_result(self, leaves):
+        number = jax.ShapeDtypeStruct((), leaves[0].dtype)
+        return {"sum": number, "sine": number}
+
+    def widths(self, leaves, what):
+        return 4, 16
+
+    def value(self, leaves):
+        self.traced.append("value")
+        return plain(*leaves)
+
+    def value_and_slopes(self, leaves, wanted):
+        self.traced.append(wanted)
+        return slopes_by_reverse_mode(lambda x: plain(*x), leaves, wanted, OWN_AXES)
+
+
+def plain(rows, x, power):
+    """Of arrays with the batch's axes first."""
+    weighted = rows * x[..., None] ** power[..., None].astype(rows.dtype)
+    return {"sum": jnp.sum(weighted, axis=-1), "sine": jnp.sin(rows[..., 0] * x)}
+
+
+def through_the_door(rows, x, power):
+    return enter(Waves(), [rows, x, power])
+
+
+RNG = np.random.default_rng(0)
+GIVEN = RNG.uniform(1, 2, (5, 3)), RNG.uniform(1, 2, 5), np.array([1, 2, 3, 1, 2])
+ONE = tuple(jnp.asarray(x[0]) for x in GIVEN)
+
+
+def total(function):
+    return lambda *x: sum(jnp.sum(y**2) for y in jax.tree.leaves(function(*x)))
+
+
+TRANSFORMED = {
+    "value": (lambda f: f, GIVEN),
+    "mapped": (lambda f: jax.vmap(f), GIVEN),
+    "mapped in the middle": (lambda f: jax.vmap(f, in_axes=(1, None, None)), None),
+    "gradient": (lambda f: jax.grad(total(f), argnums=(0, 1)), GIVEN),
+    "forward": (lambda f: jax.jacfwd(f, argnums=(0, 1)), ONE),
+    "reverse": (lambda f: jax.jacrev(f, argnums=(0, 1)), ONE),
+    "mapped Jacobian": (lambda f: jax.vmap(jax.jacrev(f, argnums=1)), GIVEN),
+    "Jacobian of the mapped": (lambda f: jax.jacfwd(jax.vmap(f), argnums=1), GIVEN),
+    "Hessian": (lambda f: jax.hessian(total(f), argnums=(0, 1)), ONE),
+    "mapped Hessian": (lambda f: jax.vmap(jax.hessian(total(f), argnums=1)), GIVEN),
+    "constants": (lambda f: jax.jacfwd(lambda t: f(*GIVEN)["sum"] * t), (2.0,)),
+    "forward of a batch": (
+        lambda f: lambda r, x, n: jax.jvp(lambda r: f(r, x, n), (r,), (r,)),
+        GIVEN,
+    ),
+    "in what columns share": (
+        lambda f: jax.grad(total(f), argnums=(0, 1)),
+        (GIVEN[0], ONE[1], GIVEN[2]),
+    ),
+    "in what rows of columns share": (
+        lambda f: jax.grad(total(f), argnums=(0, 1)),
+        (GIVEN[0], GIVEN[1][:4, None], GIVEN[2]),
+    ),
+}
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("name", TRANSFORMED)
+def test_every_transformation_is_that_of_the_function(name, compiled):
+    transform, given = TRANSFORMED[name]
+    if given is None:
+        given = np.moveaxis(np.stack([GIVEN[0], 2 * GIVEN[0]]), 0, 1), *GIVEN[1:]
+    found, expected = transform(through_the_door), transform(plain_of_arrays)
+    if compiled:
+        found = jax.jit(found)
+    pairs = zip(*(jax.tree.leaves(x(*given)) for x in (found, expected)), strict=True)
+    for a, b in pairs:
+        assert a.shape == b.shape
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
+
+
+def plain_of_arrays(*given):
+    return plain(*(jnp.asarray(x) for x in given))
+
+
+def test_a_program_is_traced_once_whatever_is_around_it():
+    program = Waves()
+
+    def slopes(rows, x, power):
+        return jax.vmap(jax.grad(lambda x: enter(program, [rows, x, power])["sum"].sum()))(x)
+
+    def loop(rows, x, power):
+        return jax.lax.fori_loop(0, 3, lambda _, y: y + 1e-3 * slopes(rows, y, power), x)
+
+    jax.jit(lambda *given: loop(given[0][0], *given[1:]))(GIVEN[0], GIVEN[1], GIVEN[2][0])
+    assert program.traced == [(False, True, False)]
+
+
+def test_what_is_traced_has_a_name_and_shapes():
+    (equation,) = jax.make_jaxpr(jax.vmap(through_the_door))(*GIVEN).eqns
+    assert equation.primitive.name == "columns"
+    assert [x.aval.shape for x in equation.outvars] == [(5,), (5,)]
