@@ -64,6 +64,7 @@ class Options(NamedTuple):
     tms: bool
     num_doublings: int | None
     unread: bool = False
+    error_budget: float | None = None
 
 
 def promoted(**arguments: Any) -> Column:
@@ -241,6 +242,7 @@ def check_options(
     num_modes: int | None,
     single_scattering: str | None,
     num_doublings: int | None,
+    error_budget: float | None = None,
 ) -> None:
     """Refuse options out of range."""
     if num_streams < 2 or num_streams % 2:
@@ -251,3 +253,5 @@ def check_options(
         raise ValueError(f"single_scattering must be 'tms' or None; got {single_scattering!r}.")
     if num_doublings is not None and num_doublings < 0:
         raise ValueError(f"num_doublings must be 0 or more; got {num_doublings}.")
+    if error_budget is not None and not 0 < error_budget < 1:
+        raise ValueError(f"error_budget must be above 0 and below 1, or None; got {error_budget}.")

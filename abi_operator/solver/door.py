@@ -36,13 +36,14 @@ def prepare(
     num_doublings: int | None,
     check_values: bool | None,
     checked: Column | None = None,
+    error_budget: float | None = None,
 ) -> Options:
     """What every door does with its promoted arguments before the program: check and choose.
 
     Values are checked here where they must be, in `checked` if the column to solve is not what the
     caller gave; where they may be that is left to `solve`.
     """
-    check_options(num_streams, num_modes, single_scattering, num_doublings)
+    check_options(num_streams, num_modes, single_scattering, num_doublings, error_budget)
     check_shapes(column, num_streams + 1 if delta_m else num_streams, multiple_views)
     if check_values:
         given = (column if checked is None else checked)._asdict()
@@ -54,6 +55,7 @@ def prepare(
         delta_m,
         single_scattering == "tms",
         num_doublings,
+        error_budget=None if error_budget is None else float(error_budget),
     )
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from ..machine.algebra import fenced
 from .column import Column, Options
-from .gradient.mode_sum import ModeSum, mode_sum
+from .gradient.mode_sum import How, ModeSum, mode_sum
 from .method.adding import Emission, Top, emitting_ground
 from .method.azimuth import (
     Directions,
@@ -31,6 +31,8 @@ from .method.single_scatter import (
     exact_single_scattering,
 )
 from .method.surface import AnySurface
+from .skipping.budget import Expected, expected
+from .skipping.plan import LayersOfModes
 
 
 class Emerging(NamedTuple):
@@ -58,7 +60,8 @@ def emerging(column: Column, options: Options) -> Emerging:
     mean, others = _grounds(column.albedo, problem)
     shine = (column.planck_levels, column.surface_emission, column.isotropic_top)
     if all(x is None for x in shine):
-        return Emerging(_brf(problem, problem.reflection(mean, others)), None)
+        at_once = _seen_at_once(problem)
+        return Emerging(at_once + 0.5 * problem.reflection(mean, others, at_once), None)
     zero = jnp.zeros_like(column.mu0)
     planck, from_ground, from_above = (zero if x is None else x for x in shine)
     jumps = None if column.planck_levels is None else planck[1:] - planck[:-1]
@@ -66,7 +69,8 @@ def emerging(column: Column, options: Options) -> Emerging:
     emission = emitting_ground(mean, problem.one, from_ground, at_ground)
     top, emission = problem.emitting_mean(mean, emission, jumps)
     emitted = top.emerging(emission, problem.one, from_above, at_top)[1:]
-    return Emerging(_brf(problem, top.reflection() + problem.higher(others)), emitted)
+    brf = _seen_at_once(problem) + 0.5 * (top.reflection() + problem.higher(others))
+    return Emerging(brf, emitted)
 
 
 def ground_response(column: Column, options: Options) -> GroundResponse:
@@ -83,7 +87,7 @@ def ground_response(column: Column, options: Options) -> GroundResponse:
     top, emission = problem.emitting_mean(ground, emission, None)
     transmission = top.emerging(emission, problem.one, zero, zero)
     return GroundResponse(
-        _brf(problem, top.reflection() + problem.higher(None)),
+        _seen_at_once(problem) + 0.5 * (top.reflection() + problem.higher(None)),
         transmission[0] * transmission[1:],
         top.spherical_albedo(emission),
     )
@@ -138,27 +142,40 @@ class _Problem:
         shared = self._shared()
         return emitting_mean(*shared, ground, emission, self.one, planck_jumps, **self._how())
 
-    def reflection(self, mean: Bordered, others: Bordered | None) -> Float[Array, "view *batch"]:
-        """Twice the sum over all modes; one view's has its derivative written out."""
-        if self.column.mu.shape[0] > 1:
-            return self.mean(mean).reflection() + self.higher(others)
-        order = jnp.arange(self.options.num_modes)
-        order = order.reshape(-1, *(1,) * self.column.mu0.ndim)
-        azimuth = self.column.relative_azimuth
+    def reflection(
+        self, mean: Bordered, others: Bordered | None, rest: Float[Array, "view *batch"]
+    ) -> Float[Array, "view *batch"]:
+        """Twice the sum over all modes, whose derivative is written out.
+
+        `rest` is the light that is added to it.
+        """
+        options, layers, azimuth = self.options, self.layers, self.column.relative_azimuth
+        order = jnp.arange(options.num_modes)
+        order = order.reshape(-1, *(1,) * azimuth.ndim)
         sign = jnp.where(order == 0, 1, jnp.where(order % 2 == 0, 2, -2)).astype(azimuth.dtype)
-        even, odd = weighted_moments(self.layers)
+        even, odd = weighted_moments(layers)
         inputs = ModeSum(
-            tau=self.layers.tau,
-            coalbedo=self.layers.coalbedo,
-            sun_secants=self.directions.sun_secants,
-            view_secant=1 / self.directions.cosines[1],
-            moments=(even, odd),
+            layers=LayersOfModes(
+                layers.tau, layers.coalbedo, self.directions.sun_secants, (even, odd)
+            ),
+            view_secants=1 / self.directions.cosines[1:],
             beams=self.tables.beams,
             ground=mean,
             grounds=others,
             weights=sign * jnp.cos(order.astype(azimuth.dtype) * azimuth),
         )
-        return mode_sum(inputs, self.doublings, not self.options.tms)[None]
+        how = How(not options.tms, options.error_budget, options.num_doublings)
+        given = self.doublings if options.error_budget is None else self._expected(rest)
+        return mode_sum(inputs, given, how)
+
+    def _expected(self, rest: Float[Array, "view *batch"]) -> Expected:
+        column, layers = self.column, self.layers
+        ground = jnp.zeros_like(rest)
+        if not isinstance(column.albedo, AnySurface):  # of which `rest` has the light sent back
+            sun = self.directions.sun_secants
+            ground = column.albedo * direct_transmission(layers.tau, column.mu, sun)
+        backward = layers.ssa * (1 - layers.moments[:, 1])
+        return expected(rest, ground, layers.tau, layers.coalbedo, backward)
 
     def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:
         azimuth = self.column.relative_azimuth
@@ -184,11 +201,11 @@ def _grounds(albedo: Array | AnySurface, problem: _Problem) -> tuple[Bordered, B
     return jax.tree.map(lambda x: x[0], grounds), jax.tree.map(lambda x: x[1:], grounds)
 
 
-def _brf(problem: _Problem, reflection: Float[Array, "view *batch"]) -> Float[Array, "view *batch"]:
-    """Twice the modes' sum halved, and what is scattered or reflected once and added exactly."""
+def _seen_at_once(problem: _Problem) -> Float[Array, "view *batch"]:
+    """What is scattered or reflected once and added exactly."""
     column, options, layers = problem.column, problem.options, problem.layers
     mu0, mu, sun = column.mu0, column.mu, problem.directions.sun_secants
-    brf = 0.5 * reflection
+    brf = jnp.zeros_like(mu * mu0)
     if isinstance(column.albedo, AnySurface):
         reflected = column.albedo.brdf(mu, mu0[None], column.relative_azimuth)
         brf = brf + reflected * direct_transmission(layers.tau, mu, sun)

@@ -41,8 +41,10 @@ from ..method.adding import top
 from ..method.bordered import Bordered
 from ..method.doublings import Doublings
 from ..method.layer import ModeKernels
-from ..method.mode_layers import Layer, Layers, Order, read
+from ..method.mode_layers import Layer, Layers, Order, added_to, read
+from ..skipping.plan import Plan, over_layers
 from .fields import Fields, pair
+from .interface import slopes_at_face
 from .layer import climb, descend
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 from .room import Keeper, Room
@@ -62,15 +64,18 @@ class Slopes(NamedTuple):
 
 
 class Shared(NamedTuple):
-    """What all modes depend on, or slopes in it."""
+    """What all modes depend on, or slopes in it; and slopes at the faces of layers, from the top
+    down, where layers are groups of others (`interface`), else None.
+    """
 
     layers: Layers
     view_secant: Float[Array, "*batch"]
+    faces: Float[Array, "level row *batch"] | None
 
 
 def mode_slopes(
     shared: Shared,
-    doublings: Doublings,
+    plan: Plan,
     single_scattering: bool,
     order: Order,
     kernels: Kernels,
@@ -84,11 +89,13 @@ def mode_slopes(
     The room (`room.Keeper.empty`) is given back filled. Layers are read and written inside the
     kernels: as inputs and outputs of a scan every array would be one more kernel a layer.
     """
-    layers, view_secant = shared
+    layers, view_secant, _ = shared
+    faces = slopes.faces
+    doublings = plan.doublings
     num_layers, num_nodes = layers.tau.shape[0], layers.moments.shape[1]
-    numbers = jnp.arange(num_layers, dtype=layers.tau.dtype)
+    alone = jnp.zeros_like(layers.tau[:1].reshape(-1)[0])  # number of a layer that is the only one
     assert doublings.most is not None
-    keeper = Keeper(layers.tau, num_nodes, doublings.most)
+    keeper = Keeper(layers.tau, num_nodes, doublings.most, faces is not None)
 
     def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
         # A layer that is the only one fills the room: in the kernel XLA finds no use for its
@@ -97,26 +104,32 @@ def mode_slopes(
 
     def put_on_and_keep(stack, room, layers, doublings, number, order, kernels, view_secant):
         layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
-        a, p = layer.matrices(order.mean, kernels, view_secant, single_scattering)
+        a, p = layer.matrices(order.mean, kernels, view_secant[None], single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
         stack, new, room = climb(stack, a, p, layer.tau, own, room, keep)
-        return stack, keeper.with_layer(room, new, number)
+        room = keeper.with_layer(room, new, number)
+        return stack, room if faces is None else keeper.with_stack(room, stack, number)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
 
     def up(carry, number):
-        return put_one(*carry, layers, doublings, number, order, kernels, view_secant), None
+        number = alone if number is None else number
+        return put_one(*carry, layers, doublings, number, order, kernels, view_secant)
 
-    (stack, room), _ = jax.lax.scan(up, (ground, room), numbers, reverse=True)
+    stack, room = over_layers(up, (ground, room), plan, upwards=True)
     reflection, fields = _fields_at_the_top(stack, weight)
 
     @compiled
     def undo_one(carry, layers, doublings, room, number, order, kernels, view_secant):
-        fields, totals, slopes = carry
+        fields, totals, slopes, faces = carry
         layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
-        kept, secants = keeper.layer(room, number), layer.secants(view_secant)
+        kept, secants = keeper.layer(room, number), layer.secants(view_secant[None])
         # The beams' own entries of the stack are 1 whatever happens in it.
         fields = fields._replace(other=jnp.zeros_like(fields.other))
+        if faces is not None:
+            stack = keeper.stack(room, number)
+            at_face = slopes_at_face(fields, stack, kernels, view_secant, single_scattering, order)
+            faces = added_to(faces, number, at_face)
         fields, a_bar, p_bar = descend(
             fields, layer.tau, secants, kept, own, partial(keeper.doubling, room, number)
         )
@@ -126,15 +139,21 @@ def mode_slopes(
         b = undo_inverse(kernels[1], layer.odd, kept.b_inverse, p_bar, single_scattering)
         _, step, _ = own.of_layer()
         totals, new = _collected(step, layer.tau, totals, a, b, coalbedo)
-        return fields, totals, slopes.plus(number, order.odd, new)
+        return fields, totals, slopes.plus(number, order.odd, new), faces
 
     def down(carry, number):
-        return undo_one(carry, layers, doublings, room, number, order, kernels, view_secant), None
+        number = alone if number is None else number
+        return undo_one(carry, layers, doublings, room, number, order, kernels, view_secant)
 
     start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
-    carry, _ = jax.lax.scan(down, (fields, start, slopes.layers), numbers)
-    fields, (even, odd, view), layers = carry
-    return reflection, room, Slopes(Shared(layers, view), even, odd, pair(1.0, [fields]))
+    carry = over_layers(down, (fields, start, slopes.layers, faces), plan)
+    fields, (even, odd, view), layers, faces = carry
+    if faces is not None:
+        below = fields._replace(other=jnp.zeros_like(fields.other))
+        last = slopes_at_face(below, ground, kernels, view_secant, single_scattering, order)
+        faces = added_to(faces, plan.num_groups, last)
+    shared = Shared(layers, view, faces)
+    return reflection, room, Slopes(shared, even, odd, pair(1.0, [fields]))
 
 
 def _of_layer(doublings: Doublings, number: Array) -> Doublings:

@@ -1,10 +1,11 @@
-r"""The derivative of the sum over azimuth modes: one gradient for all of them.
+r"""The sum over azimuth modes, and its derivative: one gradient for all of them.
 
-The pass up and down the layers of one mode is `mode`.
+The pass up and down the layers of one mode is `mode`. How many modes, groups of layers and
+doublings are solved is data (`skipping.plan`), for the value and for the gradient alike.
 """
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +21,9 @@ from ..method.doublings import Doublings
 from ..method.ground import black
 from ..method.layer import half_layer, node_functions
 from ..method.mode_layers import Layers, Order, read
+from ..skipping import budget
+from ..skipping.budget import Expected
+from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .mode import Kernels, Shared, mode_slopes
 from .room import Keeper
 
@@ -27,143 +31,225 @@ _LATER = slice(1, None)  # modes but the mean
 _WHOLE = 2  # nodes up to which all layers of all modes are one kernel
 
 
-class ModeSum(NamedTuple):
-    r"""All that the modes of one view depend on; every array is a variable.
+class How(NamedTuple):
+    """What is static.
 
     Parameters
     ----------
-    tau, coalbedo
-        Scaled thickness; 1 - ssa, of which mode 0 makes use. [-]
-    sun_secants, view_secant
-        By which the beams are attenuated. [-]
-    moments
-        :math:`\omega(2l+1)\\chi_l` of even and of odd degrees.
+    single_scattering
+        Whether modes contain the light scattered once in a layer and nowhere else.
+    error_budget
+        Relative error of the reflectance that may be made (`skipping`); None solves everything.
+    most
+        Doublings of a layer, at most: slopes have room for so many. None sets no limit to values.
+    """
+
+    single_scattering: bool
+    error_budget: float | None
+    most: int | None
+
+
+class ModeSum(NamedTuple):
+    r"""All that the modes depend on; every array is a variable.
+
+    Parameters
+    ----------
+    layers
+        What all modes see of the layers.
+    view_secants
+        By which light towards the views is attenuated. [-]
     beams
-        Legendre functions at sun and view (`method.azimuth.LegendreTables`), even and odd l + m.
+        Legendre functions at sun and views (`method.azimuth.LegendreTables`), even and odd l + m.
     ground, grounds
         Admittance of the ground in mode 0, and in modes 1, 2, ... on the first axis of every leaf;
         None is black.
     weights
-        Of each mode's reflection in the sum.
+        Of each mode's reflection towards each view in its sum.
     """
 
-    tau: Float[Array, "layer *batch"]
-    coalbedo: Float[Array, "layer *batch"]
-    sun_secants: Float[Array, "layer *batch"]
-    view_secant: Float[Array, "*batch"]
-    moments: tuple[Float[Array, "layer degree *batch"], Float[Array, "layer degree *batch"]]
-    beams: tuple[Float[Array, "mode 2 degree *batch"], Float[Array, "mode 2 degree *batch"]]
+    layers: LayersOfModes
+    view_secants: Float[Array, "view *batch"]
+    beams: tuple[Float[Array, "mode beam degree *batch"], Float[Array, "mode beam degree *batch"]]
     ground: Bordered
     grounds: Bordered | None
-    weights: Float[Array, "mode *batch"]
+    weights: Float[Array, "mode view *batch"]
+
+    def seen_from(self, view: Any) -> "ModeSum":
+        """The same with one view."""
+
+        def one(x: Array, axis: int) -> Array:
+            return jax.lax.dynamic_slice_in_dim(x, view, 1, axis)
+
+        def beams(x: Array, axis: int) -> Array:
+            sun = jax.lax.slice_in_dim(x, 0, 1, axis=axis)
+            return jnp.concatenate([sun, jax.lax.dynamic_slice_in_dim(x, view + 1, 1, axis)], axis)
+
+        def ground(y: Bordered, axis: int) -> Bordered:
+            border, diagonal = beams(y.border, axis + 1), beams(y.diagonal, axis)
+            return Bordered(y.core, border, diagonal, one(y.corner, axis))
+
+        grounds = None if self.grounds is None else ground(self.grounds, 1)
+        even, odd = (beams(x, 1) for x in self.beams)
+        return ModeSum(
+            self.layers,
+            one(self.view_secants, 0),
+            (even, odd),
+            ground(self.ground, 0),
+            grounds,
+            one(self.weights, 1),
+        )
+
+
+Given = Doublings | Expected
+"""What is known of a tile beside its inputs: the doublings of every layer where everything is
+solved, else what to expect of its reflectance."""
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
-def mode_sum(
-    inputs: ModeSum, doublings: Doublings, single_scattering: bool
-) -> Float[Array, "*batch"]:
+def mode_sum(inputs: ModeSum, given: Given, how: How) -> Float[Array, "view *batch"]:
     """Sum over the modes of weight times reflection, whose derivatives come from its gradient.
 
     Columns do not see each other. The rule is linear in the tangents, so that one gradient serves
     forward and reverse mode, and slopes that nobody asks for are not computed.
     """
-    value = partial(_reflectance, single_scattering=single_scattering)
-    num_nodes = inputs.moments[0].shape[1]
+    plan = _plan(inputs, given, how)
+    value = partial(_reflectance, single_scattering=how.single_scattering)
+    num_nodes = inputs.layers.moments[0].shape[1]
     # With more nodes there is less to gain, and more than twice as much to compile.
-    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(inputs, doublings)
+    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(inputs, plan)
+
+
+def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan:
+    """What is solved; slopes ask for more of it than a value does."""
+    if how.error_budget is None:
+        assert isinstance(given, Doublings)
+        return everything(inputs.layers, given)
+    assert isinstance(given, Expected)
+    error_budget = min(how.error_budget, budget.OF_SLOPES) if slopes else how.error_budget
+    thickest = budget.THICKEST if slopes else float("inf")
+    return planned(inputs.layers, inputs.view_secants, given, error_budget, how.most, thickest)
 
 
 def _reflectance(
-    inputs: ModeSum, doublings: Doublings, single_scattering: bool
-) -> Float[Array, "*batch"]:
-    modes = _Modes(inputs)
+    inputs: ModeSum, plan: Plan, single_scattering: bool
+) -> Float[Array, "view *batch"]:
+    modes = _Modes(inputs, plan)
 
     def reflection(mean: bool, mode: _Mode) -> Array:
-        def put_on(stack, layers, doublings, odd, kernels, view_secant, *number):
+        def put_on(stack, layers, doublings, odd, kernels, view_secants, *number):
             # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
             place = number[0] if number else jnp.zeros_like(odd)
             layer = layers.layer(place, odd)
-            a, p = layer.matrices(mean, kernels, view_secant, single_scattering)
+            a, p = layer.matrices(mean, kernels, view_secants, single_scattering)
             own = jax.tree.map(lambda x: read(x, place), doublings)
             return add_layer(stack, *half_layer(a, p, layer.tau, own), layer.tau)
 
         put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
-        kernels, view_secant = _kernels(mode.nodes, mode.beams), inputs.view_secant
-        shared = modes.layers, doublings, mode.order.odd, kernels, view_secant
+        kernels, views = _kernels(mode.nodes, mode.beams), inputs.view_secants
+        shared = modes.layers, plan.doublings, mode.order.odd, kernels, views
 
-        def add(stack, *number):
-            return put_on(stack, *shared, *number), None
+        def add(stack, number):
+            return put_on(stack, *shared, *([] if number is None else [number]))
 
-        ground = modes.ground(mode, mean)
-        numbers = jnp.arange(inputs.tau.shape[0], dtype=inputs.tau.dtype)
-        if numbers.size == 1:
-            stack, _ = add(ground)
-        else:
-            stack, _ = jax.lax.scan(add, ground, numbers, reverse=True)
-        return mode.weight * top(stack).reflection()[0]
+        stack = over_layers(add, modes.ground(mode, mean), plan, upwards=True)
+        return top(stack).reflection()
+
+    def another(total, mode):
+        found = reflection(False, mode)
+        total = total + mode.weight * found
+        return total, None, total, jnp.max(jnp.abs(found), axis=0)
 
     # Without slopes a kernel for the mean alone is soon compiled, and a tenth faster than to ask in
     # each layer which mode it is.
-    first, others = (jax.tree.map(lambda x, i=i: x[i], modes.all()) for i in (0, _LATER))
-    return jax.lax.scan(
-        lambda total, mode: (total + reflection(False, mode), None), reflection(True, first), others
-    )[0]
+    every = modes.all()
+    first = jax.tree.map(lambda x: x[0], every)
+    total = first.weight * reflection(True, first)
+    return over_modes(another, total, every, 1, None, plan)[0]
 
 
 @partial(mode_sum.defjvp, symbolic_zeros=True)
-def _mode_sum_jvp(single_scattering, primals, tangents):
-    inputs, doublings = primals
-    value, gradient = reflectance_and_gradient(inputs, doublings, single_scattering)
-    change = jnp.zeros_like(value)
-    for slope, tangent in zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents[0]), strict=True):
-        if not isinstance(tangent, SymbolicZero):
-            change = change + jnp.sum(slope * tangent, axis=tuple(range(slope.ndim - value.ndim)))
-    return value, change
+def _mode_sum_jvp(how, primals, tangents):
+    inputs, given = primals
+    num_views = inputs.view_secants.shape[0]
+
+    def of_one(inputs, tangents):
+        value, gradient = reflectance_and_gradient(inputs, given, how)
+        change = jnp.zeros_like(value)
+        pairs = zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents), strict=True)
+        for slope, tangent in pairs:
+            if not isinstance(tangent, SymbolicZero):
+                axes = tuple(range(slope.ndim - value.ndim))
+                change = change + jnp.sum(slope * tangent, axis=axes)
+        return value, change
+
+    if num_views == 1:
+        value, change = of_one(inputs, tangents[0])
+        return value[None], change[None]
+    changes = jax.tree.map(
+        lambda t, x: jnp.zeros_like(x) if isinstance(t, SymbolicZero) else t, tangents[0], inputs
+    )
+    return jax.lax.map(
+        lambda view: of_one(inputs.seen_from(view), changes.seen_from(view)), jnp.arange(num_views)
+    )
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
 def reflectance_and_gradient(
-    inputs: ModeSum, doublings: Doublings, single_scattering: bool
+    inputs: ModeSum, given: Given, how: How
 ) -> tuple[Float[Array, "*batch"], ModeSum]:
-    """Sum over the modes of weight times reflection, and its slope in every input.
+    """Sum over the modes of weight times reflection towards the one view, and its slopes.
 
     Each column's slope is that of its own value. Slopes in the ground's cores are symmetric.
     `Doublings.most` must be given: there is room for so many.
     """
+    return _reflectance_and_gradient(inputs, _plan(inputs, given, how, slopes=True), how)
+
+
+def _reflectance_and_gradient(inputs, plan, how):
+    doublings = plan.doublings
     if doublings.most is None:
         raise TypeError("slopes need a largest number of doublings.")
-    modes = _Modes(inputs)
-    how = doublings, single_scattering
-    shared = Shared(modes.layers, inputs.view_secant)
+    modes = _Modes(inputs, plan)
+    faces = None
+    if plan.groups is not None:
+        num_layers, num_rows = modes.layers.tau.shape[0], 3 + 2 * modes.num_nodes
+        faces = jnp.zeros(
+            (num_layers + 1, num_rows, *modes.layers.tau.shape[1:]), modes.layers.tau.dtype
+        )
+    shared = Shared(modes.layers, inputs.view_secants[0], faces)
 
-    def step(carry, mode):
+    def one(carry, mode):
         value, slopes, of_mean, room = carry
         kernels, ground = _kernels(mode.nodes, mode.beams), modes.ground(mode)
+        weight = mode.weight[0]
         reflection, room, found = mode_slopes(
-            shared, *how, mode.order, kernels, ground, mode.weight, slopes, room
+            shared, plan, how.single_scattering, mode.order, kernels, ground, weight, slopes, room
         )
         if inputs.grounds is None:
             mean = mode.order.mean
             of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, found.ground)
         own = None if inputs.grounds is None else found.ground
-        value = value + mode.weight * reflection
-        beams = found.even_beams, found.odd_beams
-        return (value, found.shared, of_mean, room), (reflection, beams, own)
+        value = value + weight * reflection
+        # The mean is never the last by chance.
+        size = jnp.where(mode.order.mean > 0, jnp.inf, jnp.abs(reflection))
+        row = reflection[None], (found.even_beams, found.odd_beams), own
+        return (value, found.shared, of_mean, room), row, value, size
 
-    nothing = jax.tree.map(jnp.zeros_like, (inputs.view_secant, shared, inputs.ground))
-    space = Keeper(inputs.tau, modes.num_nodes, doublings.most).empty()
-    carry, rows = jax.lax.scan(step, (*nothing, space), modes.all())
+    nothing = jax.tree.map(jnp.zeros_like, (shared.view_secant, shared, inputs.ground))
+    keep = shared.layers.tau, modes.num_nodes, doublings.most, faces is not None
+    space = Keeper(*keep).empty()
+    every = modes.all()
+    rows = inputs.weights, inputs.beams, every.ground
+    carry, rows = over_modes(one, (*nothing, space), every, 0, rows, plan)
     (value, slopes, of_mean, _), (reflections, beams, of_grounds) = carry, rows
     if of_grounds is not None:
         of_mean, of_grounds = (jax.tree.map(lambda x, i=i: x[i], of_grounds) for i in (0, _LATER))
     summed = slopes.layers
-    moments = summed.moments.reshape(2, -1, *summed.moments.shape[1:])
+    even, odd = summed.moments.reshape(2, -1, *summed.moments.shape[1:])
+    found = LayersOfModes(summed.tau, summed.coalbedo, summed.sun_secant, (even, odd))
     gradient = ModeSum(
-        tau=summed.tau,
-        coalbedo=summed.coalbedo,
-        sun_secants=summed.sun_secant,
-        view_secant=slopes.view_secant,
-        moments=(moments[0], moments[1]),
+        layers=plan.slopes(found, slopes.faces),
+        view_secants=slopes.view_secant[None],
         beams=beams,
         ground=of_mean,
         grounds=of_grounds,
@@ -173,11 +259,14 @@ def reflectance_and_gradient(
 
 
 @reflectance_and_gradient.defjvp
-def _second_derivative(single_scattering, primals, tangents):
-    inputs, doublings = primals
+def _second_derivative(how, primals, tangents):
+    """JAX's own, of the program that solves everything with its doublings written out."""
+    inputs, given = primals
+    most = how.most if how.error_budget is not None else given.most
+    doublings = Doublings(None, most).written_out()
 
     def written_out(inputs):
-        return reflectance_and_gradient.fun(inputs, doublings.written_out(), single_scattering)
+        return _reflectance_and_gradient(inputs, everything(inputs.layers, doublings), how)
 
     return jax.jvp(written_out, (inputs,), tangents[:1])
 
@@ -186,20 +275,19 @@ class _Mode(NamedTuple):
     """Of one mode; its ground is None where modes but the first see a black one."""
 
     order: Order
-    weight: Float[Array, "*batch"]
+    weight: Float[Array, "view *batch"]
     ground: Bordered | None
     nodes: tuple[Array, Array]
     beams: tuple[Array, Array]
 
 
 class _Modes:
-    """The inputs as the modes see them."""
+    """The inputs as the modes see them, with the layers that are solved."""
 
-    def __init__(self, inputs: ModeSum):
-        even, odd = inputs.moments
+    def __init__(self, inputs: ModeSum, plan: Plan):
+        tau, coalbedo, sun_secants, (even, odd) = plan.layers
         self.inputs = inputs
-        both = jnp.concatenate([even, odd])
-        self.layers = Layers(inputs.tau, inputs.coalbedo, inputs.sun_secants, both)
+        self.layers = Layers(tau, coalbedo, sun_secants, jnp.concatenate([even, odd]))
         self.num_nodes = even.shape[1]
         self.num_streams = 2 * self.num_nodes
         self.num_modes = inputs.weights.shape[0]
@@ -209,13 +297,13 @@ class _Modes:
     def _nodes(self, functions: np.ndarray, parity: int) -> Array:
         """Functions at the nodes of the degrees of one parity of l + m, all modes."""
         rows = [functions[m, (m + parity) % 2 :: 2].T for m in range(self.num_modes)]
-        return jnp.asarray(np.stack(rows), self.inputs.tau.dtype)
+        return jnp.asarray(np.stack(rows), self.layers.tau.dtype)
 
     def all(self) -> _Mode:
         """What differs from mode to mode, on the first axis."""
         x = self.inputs
-        number = jnp.arange(self.num_modes, dtype=x.tau.dtype)
-        order = Order(number % 2, (number == 0).astype(x.tau.dtype))
+        number = jnp.arange(self.num_modes, dtype=self.layers.tau.dtype)
+        order = Order(number % 2, (number == 0).astype(number.dtype))
         grounds = x.grounds
         if grounds is not None:
             grounds = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), x.ground, grounds)

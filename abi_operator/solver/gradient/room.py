@@ -24,11 +24,13 @@ from .layer import Doubled, Kept, Part
 class Room(NamedTuple):
     """What is kept: `gradient.layer.Kept` of each layer, and a quotient of each doubling.
 
-    None in place of the latter where there are none.
+    None in place of the latter where there are none. And the stack with each layer on it, where it
+    is wanted.
     """
 
     layers: Any
     doublings: Any
+    stacks: Any = None
 
 
 class Keeper:
@@ -42,17 +44,27 @@ class Keeper:
         Rows of the matrices.
     most
         Doublings of a layer, at most.
+    stacks
+        Whether stacks are kept.
     """
 
-    def __init__(self, tau: Float[Array, "layer *batch"], num_nodes: int, most: int):
+    def __init__(
+        self,
+        tau: Float[Array, "layer *batch"],
+        num_nodes: int,
+        most: int,
+        stacks: bool = False,
+    ):
         self.num_layers, self.num_nodes, self.most = tau.shape[0], num_nodes, most
+        self.stacks = stacks
         self.dtype, self.shapes = tau.dtype, _shapes(num_nodes, tau)
 
     def empty(self) -> Room:
         """Room with nothing of use in it."""
         count = self.num_layers * self.most
         doublings = _empty(self.shapes.doublings, count, 1) if count else None
-        return Room(_empty(self.shapes.layers, self.num_layers, 0), doublings)
+        stacks = _empty(self.shapes.stacks, self.num_layers, 2) if self.stacks else None
+        return Room(_empty(self.shapes.layers, self.num_layers, 0), doublings, stacks)
 
     def with_layer(self, room: Room, kept: Any, number: Array) -> Room:
         """The room with what is kept of a layer."""
@@ -61,6 +73,15 @@ class Keeper:
     def with_doubling(self, room: Room, kept: Any, number: Array, k: Any) -> Room:
         """The room with what is kept of a layer's k-th doubling."""
         return room._replace(doublings=self._put(room.doublings, kept, self._place(number, k)))
+
+    def with_stack(self, room: Room, stack: Bordered, number: Array) -> Room:
+        """The room with the stack of a layer and all below."""
+        return room._replace(stacks=self._put(room.stacks, stack, number))
+
+    def stack(self, room: Room, number: Array) -> Any:
+        """What was kept of a stack."""
+        found = self._get(room.stacks, self.shapes.stacks, number)
+        return jax.tree.map(as_array, found, is_leaf=is_entry)
 
     def layer(self, room: Room, number: Array) -> Any:
         """What was kept of a layer."""
@@ -101,12 +122,12 @@ def _empty(shapes: Any, count: int, first: int) -> Any:
     # A number of its own in each: arrays of zeros would be one for XLA, and copied.
     leaves, structure = jax.tree.flatten(shapes)
     return structure.unflatten(
-        jnp.full((count, x.size), first + 2.0 * k, x.dtype) for k, x in enumerate(leaves)
+        jnp.full((count, x.size), first + 3.0 * k, x.dtype) for k, x in enumerate(leaves)
     )
 
 
 def _shapes(num_nodes: int, like: Float[Array, "layer *batch"]) -> Room:
-    """What `climb` keeps of one layer, and of each doubling."""
+    """What `climb` keeps of one layer, and of each doubling; and a stack."""
 
     def kept() -> Room:
         def array(*own: int) -> Array:
@@ -117,7 +138,7 @@ def _shapes(num_nodes: int, like: Float[Array, "layer *batch"]) -> Room:
         part, feed = Part(core, border), Feed(border, corner)
         adding = Action(core, border, beams, beams, feed, feed)
         own = Bordered(core, border, beams, corner)
-        return Room(Kept(own, feed, feed, part, part, adding), Doubled(part, feed))
+        return Room(Kept(own, feed, feed, part, part, adding), Doubled(part, feed), own)
 
     return jax.eval_shape(kept)
 

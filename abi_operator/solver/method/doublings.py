@@ -7,6 +7,7 @@ what it keeps on the way up is as much as there are doublings.
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import equinox as eqx
@@ -20,6 +21,8 @@ from .quadrature import double_gauss
 # Largest z = tau' / (2 mu_min) of a layer for which the start of `layer.half_layer`, doubled
 # 0, 1, 2, 3, 4 times, errs by 1e-12 or less; four times as much for each doubling after that.
 _REACH = (0.0356, 0.0713, 0.142, 0.287, 179.0)
+# Doublings and values of z among which `reaches` looks.
+_LOOKED_AT, _DEPTHS = 8, np.geomspace(1e-3, 1e5, 4001)
 
 # Largest numbers that `num_doublings=None` chooses from for slopes: few, so that few programs
 # compile.
@@ -84,13 +87,40 @@ def start_coefficient(num_doublings: int) -> float:
     return 11 / 30 if num_doublings <= 3 else 10 / 21
 
 
+@cache
+def reaches(error: float) -> tuple[float, ...]:
+    r"""Largest z for which the start, doubled 0, 1, 2, ... times, errs by `error` or less. [-]
+
+    z is the optical depth of half a layer on its way, for which the layer's admittance and
+    impedance are z tanh(z) / z and z coth(z); the start and its doublings are those of
+    `layer.half_layer` for a matrix of one number.
+    """
+    return tuple(_reach_of(k, error) for k in range(_LOOKED_AT))
+
+
+def _reach_of(number: int, error: float) -> float:
+    z = _DEPTHS
+    h, d = z / 2**number, start_coefficient(number)
+    fraction = 1 / 3 - (h * h / 9) / (5 + d * h * h)
+    impedance = 1 + h * h * fraction
+    admittance = h - h**3 * fraction / impedance
+    for _ in range(number):
+        impedance = impedance + h * admittance
+        admittance = 2 * (admittance - h * admittance**2 / impedance)
+        h = 2 * h
+    wrong = np.maximum(abs(admittance / np.tanh(z) - 1), abs(impedance * np.tanh(z) / z - 1))
+    beyond = np.flatnonzero(wrong > error)
+    return float(z[beyond[0] - 1] if beyond.size and beyond[0] else z[-1 if not beyond.size else 0])
+
+
 def layer_doublings(
     tau: Float[Array, "layer *batch"],
     secants: Float[Array, "beam layer *batch"],
     num_streams: int,
     most: int | None,
+    error: float | None = None,
 ) -> Doublings:
-    """Doublings of every layer of a tile: the fewest that are exact for all its columns.
+    """Doublings of every layer of a tile: the fewest that suffice for all its columns.
 
     Parameters
     ----------
@@ -102,6 +132,8 @@ def layer_doublings(
         Number of streams; their smallest cosine counts as well.
     most
         Doublings of a layer, at most; None for no limit but `_MOST`.
+    error
+        Of a layer's response that may be left (`reaches`); None for rounding's.
 
     Columns that are not finite do not count.
     """
@@ -109,7 +141,7 @@ def layer_doublings(
     z = _half_thickness(tau, secants, num_streams)
     z = jnp.where(jnp.isfinite(z), z, 0).reshape(tau.shape[0], -1)
     thickest = jnp.max(z, axis=1, initial=0)
-    reach = np.array([_reach(k) for k in range(limit)])
+    reach = np.array([_reach(k, error) for k in range(limit)])
     reach = jnp.asarray(np.minimum(reach, np.finfo(tau.dtype).max), tau.dtype)
     count = jnp.sum(thickest[:, None] > reach, axis=1)
     table = np.array([_numbers(k) for k in range(limit + 1)])
@@ -140,8 +172,10 @@ def _half_thickness(tau: Array, secants: Array, num_streams: int) -> Array:
     return 0.5 * tau * steepest
 
 
-def _reach(doublings: int) -> float:
-    return _REACH[doublings] if doublings < 5 else _REACH[4] * 4.0 ** (doublings - 4)
+def _reach(doublings: int, error: float | None = None) -> float:
+    known = _REACH if error is None else reaches(error)
+    last = len(known) - 1
+    return known[min(doublings, last)] * 4.0 ** max(0, doublings - last)
 
 
 def _numbers(doublings: int) -> tuple[int, float, float]:

@@ -35,19 +35,19 @@ class Layer(NamedTuple):
     even: Float[Array, "degree *batch"]
     odd: Float[Array, "degree *batch"]
 
-    def secants(self, view: Float[Array, "*batch"]) -> Float[Array, "2 *batch"]:
-        """Of both beams."""
-        return jnp.stack([self.sun_secant, view])
+    def secants(self, views: Float[Array, "view *batch"]) -> Float[Array, "beam *batch"]:
+        """Of all beams."""
+        return jnp.concatenate([self.sun_secant[None], views])
 
     def matrices(
         self,
         mean: Float[Array, ""] | bool,
         kernels: tuple[ModeKernels, ModeKernels],
-        view_secant: Float[Array, "*batch"],
+        view_secants: Float[Array, "view *batch"],
         single_scattering: bool,
     ) -> tuple[Bordered, Bordered]:
         """A and the inverse of B; whether the mode is the mean may be known or a number."""
-        secants = self.secants(view_secant)
+        secants = self.secants(view_secants)
         a = layer_matrix(kernels[0], self.even, secants, single_scattering)
         if isinstance(mean, bool):
             a = conservative(a, self.coalbedo) if mean else a
@@ -83,11 +83,11 @@ class Layers(NamedTuple):
         """The same with `new` added to one of them."""
         moments = self.moments
         for place, added in zip(self._places(number, odd), (new.even, new.odd), strict=True):
-            moments = _add(moments, place, added)
+            moments = added_to(moments, place, added)
         return Layers(
-            _add(self.tau, number, new.tau),
-            _add(self.coalbedo, number, new.coalbedo),
-            _add(self.sun_secant, number, new.sun_secant),
+            added_to(self.tau, number, new.tau),
+            added_to(self.coalbedo, number, new.coalbedo),
+            added_to(self.sun_secant, number, new.sun_secant),
             moments,
         )
 
@@ -99,11 +99,14 @@ class Layers(NamedTuple):
 def read(stack: Float[Array, "layer *own"], place: Array) -> Float[Array, "*own"]:
     """One entry of an array."""
     # Not `jax.lax.dynamic_index_in_dim`, which as a `jax.jit` would be a kernel and a copy: what
-    # is read is part of the kernel that uses it, what `_add` writes must be a kernel.
+    # is read is part of the kernel that uses it, what `added_to` writes must be a kernel.
     start = place.astype(jnp.int32), *(jnp.int32(0) for _ in stack.shape[1:])
     return jax.lax.dynamic_slice(stack, start, (1, *stack.shape[1:]))[0]
 
 
-def _add(stack, place, new):
+def added_to(
+    stack: Float[Array, "layer *own"], place: Array, new: Float[Array, "*own"]
+) -> Float[Array, "layer *own"]:
+    """The same array with `new` added to one entry."""
     new = read(stack, place) + new
     return jax.lax.dynamic_update_index_in_dim(stack, new, place.astype(jnp.int32), 0)

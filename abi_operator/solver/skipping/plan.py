@@ -1,0 +1,212 @@
+"""What is solved of a tile of columns: its groups of layers, their doublings, and the last mode."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..method.doublings import Doublings, layer_doublings
+from ..method.mode_layers import read
+from . import budget
+from .budget import Expected
+from .grouping import Groups, grouped
+from .merging import Solved, handed_back, merged
+
+
+class LayersOfModes(NamedTuple):
+    """What all modes see of the layers, top first.
+
+    Parameters
+    ----------
+    tau, coalbedo, sun_secants
+        Scaled thickness, 1 - ssa, and the secant of the sun's beam. [-]
+    moments
+        :math:`\\omega(2l+1)\\chi_l` of even and of odd degrees. [-]
+    """
+
+    tau: Float[Array, "layer *batch"]
+    coalbedo: Float[Array, "layer *batch"]
+    sun_secants: Float[Array, "layer *batch"]
+    moments: tuple[Float[Array, "layer degree *batch"], Float[Array, "layer degree *batch"]]
+
+    def rows(self) -> Float[Array, "layer row *batch"]:
+        """All but the thickness, in one array."""
+        single = jnp.stack([self.coalbedo, self.sun_secants], axis=1)
+        return jnp.concatenate([single, *self.moments], axis=1)
+
+    def of_rows(self, tau: Array, rows: Float[Array, "layer row *batch"]) -> "LayersOfModes":
+        """Layers, or slopes in them, from a thickness and such an array."""
+        end = 2 + self.moments[0].shape[1]
+        return LayersOfModes(tau, rows[:, 0], rows[:, 1], (rows[:, 2:end], rows[:, end:]))
+
+
+class Plan(eqx.Module):
+    """How much of a tile is solved.
+
+    Parameters
+    ----------
+    layers
+        What is solved: groups of the layers given, in the places of the first ones.
+    doublings
+        Of each group.
+    given, groups
+        The layers given, and which group each belongs to; None where each is solved by itself.
+    known, allowed
+        Of the reflectance beside the modes', and the share of it that a mode may count for and yet
+        be the last one; None where all modes are solved.
+    """
+
+    layers: LayersOfModes
+    doublings: Doublings
+    given: LayersOfModes
+    groups: Groups | None
+    known: Expected | None
+    allowed: float | None = eqx.field(static=True)
+
+    @property
+    def num_groups(self) -> Any:
+        """Layers to solve: a number where it is known, else data."""
+        return self.layers.tau.shape[0] if self.groups is None else self.groups.number
+
+    def slopes(
+        self, found: LayersOfModes, faces: Float[Array, "level row *batch"] | None
+    ) -> LayersOfModes:
+        """Slopes in the layers given from those in what is solved and at its faces."""
+        if self.groups is None:
+            return found
+        assert faces is not None
+        groups = Solved(self.layers.tau, self.layers.rows(), found.tau, found.rows(), faces)
+        tau, rows = handed_back(self.groups, self.given.tau, self.given.rows(), groups)
+        return found.of_rows(tau, rows)
+
+    def settled(
+        self, total: Float[Array, "*view batch"], size: Float[Array, "batch"]
+    ) -> Bool[Array, ""]:
+        """Whether modes so small, after such a sum of them, let all columns of the tile end."""
+        assert self.known is not None and self.allowed is not None
+        brf = jnp.maximum(jnp.abs(0.5 * total + self.known.added), budget.LEAST_BRF)
+        return ~jnp.any(size > self.allowed * brf)
+
+
+def everything(layers: LayersOfModes, doublings: Doublings) -> Plan:
+    """All layers and all modes."""
+    return Plan(layers, doublings, layers, None, None, None)
+
+
+def planned(
+    layers: LayersOfModes,
+    view_secants: Float[Array, "view *batch"],
+    known: Expected,
+    error_budget: float,
+    most: int | None,
+    thickest: float = float("inf"),
+) -> Plan:
+    """What an error budget asks for.
+
+    Parameters
+    ----------
+    layers, view_secants
+        Of a tile.
+    known
+        Of the reflectance of its columns.
+    error_budget
+        Relative error of the reflectance that may be made (`budget`).
+    most
+        Doublings of a layer, at most; None for no limit.
+    thickest
+        Optical depth on the way down and up that no group exceeds. [-]
+    """
+    given, groups = layers, None
+    if layers.tau.shape[0] > 1:
+        secant = 0.5 * (layers.sun_secants[0] + jnp.max(view_secants, axis=0))
+        allowed = budget.OF_MERGING * error_budget * known.least
+        forward = layers.moments[1][:, 0] / 3
+        groups = grouped(layers.tau, 1 - layers.coalbedo, forward, secant, allowed, thickest)
+        tau, rows = merged(groups, layers.tau, layers.rows())
+        layers = layers.of_rows(tau, rows)
+    views = jnp.broadcast_to(view_secants[:, None], (len(view_secants), *layers.tau.shape))
+    secants = jnp.concatenate([layers.sun_secants[None], views])
+    num_streams = 2 * layers.moments[0].shape[1]
+    doublings = layer_doublings(
+        layers.tau, secants, num_streams, most, budget.OF_DOUBLINGS * error_budget
+    )
+    allowed_of_modes = budget.OF_MODES * error_budget
+    return Plan(layers, doublings, given, groups, known, allowed_of_modes)
+
+
+def over_layers(
+    body: Callable[[Any, Any], Any], carry: Any, plan: Plan, upwards: bool = False
+) -> Any:
+    """``carry = body(carry, number)`` for every layer to solve; numbers are floating.
+
+    Of one layer that is the only one the number is None: XLA would find no use for it.
+    """
+    tau = plan.layers.tau
+    if tau.shape[0] == 1:
+        return body(carry, None)
+    if plan.groups is None:
+        numbers = jnp.arange(tau.shape[0], dtype=tau.dtype)
+        step = lambda carry, number: (body(carry, number), None)  # noqa: E731
+        return jax.lax.scan(step, carry, numbers, reverse=upwards)[0]
+    count = plan.groups.number.astype(jnp.int32)
+
+    def one(k, carry):
+        return body(carry, (count - 1 - k if upwards else k).astype(tau.dtype))
+
+    return jax.lax.fori_loop(0, count, one, carry)
+
+
+def over_modes(
+    body: Callable[[Any, Any], tuple[Any, Any, Any, Any]],
+    carry: Any,
+    modes: Any,
+    start: int,
+    rows: Any,
+    plan: Plan,
+) -> tuple[Any, Any]:
+    """``carry, row, total, size = body(carry, mode)`` for the modes that count.
+
+    Parameters
+    ----------
+    body
+        Of one mode; gives its row of the results, the sum of the modes so far, and how large a part
+        of it this mode may be at any azimuth.
+    carry
+        What goes from mode to mode.
+    modes
+        What differs between them, on the first axis.
+    start
+        The first of them.
+    rows
+        What the results are like, in rows of all modes: those of modes that are not solved are 0.
+    plan
+        Whether all are solved, or until they are small.
+    """
+    num_modes = jax.tree.leaves(modes)[0].shape[0]
+    if plan.allowed is None:
+        rest = jax.tree.map(lambda x: x[start:], modes)
+        carry, found = jax.lax.scan(lambda c, mode: body(c, mode)[:2], carry, rest)
+        return carry, found
+    before = jnp.full_like(plan.layers.tau[0], jnp.inf)
+
+    def unsettled(state):
+        m, _, _, _, settled = state
+        return (m < num_modes) & ~settled
+
+    def one(state):
+        m, carry, rows, before, _ = state
+        carry, row, total, size = body(carry, jax.tree.map(lambda x: read(x, m), modes))
+        rows = jax.tree.map(
+            lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
+        )
+        either = jnp.maximum(size, budget.DECAY * before)
+        return m + 1, carry, rows, size, plan.settled(total, either)
+
+    rows = jax.tree.map(jnp.zeros_like, rows)
+    _, carry, rows, _, _ = jax.lax.while_loop(
+        unsettled, one, (jnp.int32(start), carry, rows, before, jnp.asarray(False))
+    )
+    return carry, jax.tree.map(lambda x: x[start:], rows)

@@ -1,0 +1,223 @@
+"""An error budget: what it leaves out, that it is kept, and that nothing else depends on it."""
+
+from functools import cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from abi_operator.solver import toa_brf
+from abi_operator.solver.method.doublings import reaches
+from abi_operator.solver.skipping.grouping import grouped
+from abi_operator.solver.skipping.merging import Solved, handed_back, merged
+
+# Rounding of sums in another order.
+ROUNDING = 1e-13
+LAYERS, STREAMS = 12, 8
+
+
+@cache
+def columns(count=96, seed=3):
+    """Air of twelve layers with a plume in two or three of them, or a cloud; many of them alike."""
+    rng = np.random.default_rng(seed)
+    level = np.linspace(0, 1, LAYERS + 1)
+    air = rng.choice([0.2, 0.05, 0.002], (count, 1)) * np.diff(level**2)[None]
+    base = rng.integers(5, LAYERS - 2, count)[:, None]
+    inside = (np.arange(LAYERS) >= base) & (np.arange(LAYERS) < base + 3)
+    plume = inside * 10 ** rng.uniform(-2, 1, (count, 1))
+    cloud = rng.random((count, 1)) < 0.3
+    g, ssa = np.where(cloud, 0.86, 0.65), np.where(cloud, 0.99999, 0.9)
+    scattered = air + ssa * plume
+    order = np.arange(4 * STREAMS + 1)
+    rayleigh = np.where(order == 0, 1, np.where(order == 2, 0.1, 0))
+    moments = air[..., None] * rayleigh + (ssa * plume)[..., None] * (g**order)[:, None]
+    return {
+        "tau": air + plume,
+        "ssa": scattered / (air + plume),
+        "moments": moments / scattered[..., None],
+        "albedo": rng.uniform(0, 0.4, count),
+        "mu0": rng.uniform(0.3, 0.95, count),
+        "mu": rng.uniform(0.4, 0.95, count),
+        "relative_azimuth": rng.uniform(0, np.pi, count),
+    }
+
+
+@cache
+def solved(error_budget):
+    return np.asarray(toa_brf(**columns(), num_streams=STREAMS, error_budget=error_budget))
+
+
+@cache
+def slopes(error_budget):
+    """Of each column's reflectance in all its arguments."""
+
+    def total(arguments):
+        return jnp.sum(toa_brf(**arguments, num_streams=STREAMS, error_budget=error_budget))
+
+    return jax.tree.map(np.asarray, jax.grad(total)(columns()))
+
+
+def error(error_budget):
+    exact = solved(None)
+    return np.abs(solved(error_budget) - exact) / np.maximum(exact, 0.01)
+
+
+@pytest.mark.parametrize("error_budget", [1e-2, 1e-3, 1e-5])
+def test_the_budget_is_kept(error_budget):
+    assert np.quantile(error(error_budget), 0.99) < error_budget
+    assert error(error_budget).max() < 10 * error_budget
+
+
+def test_a_larger_budget_is_spent():
+    """Something is left out at each of them, and more where more may be."""
+    spent = [np.median(error(x)) for x in (1e-2, 1e-3, 1e-5)]
+    assert spent[0] > spent[1] > spent[2] > 1e-12
+
+
+@pytest.mark.parametrize("error_budget", [1e-2, 1e-3])
+def test_slopes_of_members_are_their_own(error_budget):
+    """1 % of a column's slopes, those in each of its layers among them, in 99 of 100 columns."""
+    exact, found = slopes(None), slopes(error_budget)
+    count = len(exact["mu0"])
+
+    def flat(slopes):
+        return np.concatenate([x.reshape(count, -1) for x in slopes.values()], axis=1)
+
+    wrong = np.linalg.norm(flat(found) - flat(exact), axis=1)
+    assert np.quantile(wrong / np.linalg.norm(flat(exact), axis=1), 0.99) < 0.01
+
+
+def test_the_same_inside_of_everything():
+    """Under `jax.jit`, mapped one by one, in other company: a column's neighbours change nothing
+    but what is left out for it, within the budget."""
+    given, error_budget = columns(), 1e-3
+
+    def one(arguments):
+        return toa_brf(**arguments, num_streams=STREAMS, error_budget=error_budget)
+
+    np.testing.assert_allclose(jax.jit(one)(given), solved(error_budget), rtol=2 * error_budget)
+    np.testing.assert_allclose(jax.vmap(one)(given), solved(error_budget), rtol=2 * error_budget)
+    both = jax.jit(jax.vmap(jax.value_and_grad(one)))(given)
+    np.testing.assert_allclose(both[0], solved(error_budget), rtol=2 * error_budget)
+    wanted = slopes(error_budget)["albedo"]
+    np.testing.assert_allclose(both[1]["albedo"], wanted, rtol=0.01, atol=1e-3 * wanted.max())
+
+
+def test_two_views_at_once():
+    """Both get what each gets alone, within the budget."""
+    given, views = dict(columns()), np.array([0.5, 0.9])
+    given |= {"mu": np.broadcast_to(views, (96, 2)), "relative_azimuth": np.full((96, 2), 1.0)}
+    how = {"num_streams": STREAMS, "multiple_views": True}
+    exact = np.asarray(toa_brf(**given, **how))
+    found = np.asarray(toa_brf(**given, **how, error_budget=1e-3))
+    wrong = np.abs(found - exact) / np.maximum(exact, 0.01)
+    assert np.quantile(wrong, 0.99) < 1e-3
+
+
+def test_second_derivatives_solve_everything():
+    """They are those without a budget."""
+    given = {name: x[:2] for name, x in columns().items()}
+
+    def curvature(error_budget):
+        def brf(tau):
+            how = {"num_streams": 2, "num_doublings": 4, "error_budget": error_budget}
+            moments = given["moments"][..., :3]
+            return jnp.sum(toa_brf(**given | {"tau": tau, "moments": moments}, **how))
+
+        return jax.jvp(jax.grad(brf), (given["tau"],), (np.ones_like(given["tau"]),))[1]
+
+    np.testing.assert_allclose(curvature(1e-2), curvature(None), rtol=0.1, atol=0.05)
+
+
+@pytest.mark.float32
+def test_single_precision():
+    given = {name: x.astype(np.float32) for name, x in columns().items()}
+    exact = np.asarray(toa_brf(**given, num_streams=STREAMS))
+    found = np.asarray(toa_brf(**given, num_streams=STREAMS, error_budget=1e-3))
+    assert found.dtype == np.float32
+    wrong = np.abs(found - exact) / np.maximum(exact, 0.01)
+    assert np.quantile(wrong, 0.99) < 1e-3
+
+
+@pytest.mark.parametrize("wrong", [0.0, 1.0, -1e-3, float("nan")])
+def test_budgets_that_are_none(wrong):
+    with pytest.raises(ValueError, match="error_budget must be above 0"):
+        toa_brf(**columns(), num_streams=STREAMS, error_budget=wrong)
+
+
+def layers(batch=5):
+    rng = np.random.default_rng(0)
+    tau = 10 ** rng.uniform(-3, 0, (LAYERS, batch))
+    rows = rng.uniform(0, 1, (LAYERS, 4, batch))
+    return jnp.asarray(tau), jnp.asarray(rows)
+
+
+def test_alike_layers_are_one_group():
+    tau, _ = layers()
+    same = 0 * tau + 0.9
+    secant, allowed = jnp.full(5, 2.0), jnp.full(5, 1e-12)
+    groups = grouped(tau, same, 0.5 * same, secant, allowed, np.inf)
+    assert groups.number == 1 and not groups.labels.any()
+    other = same.at[LAYERS // 2 :].set(0.1)
+    groups = grouped(tau, other, 0.5 * other, secant, allowed, np.inf)
+    assert groups.number == 2
+    np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
+
+
+def test_no_group_is_thicker_than_it_may_be():
+    tau, _ = layers()
+    same = 0 * tau + 0.9
+    groups = grouped(tau, same, same, jnp.full(5, 2.0), jnp.full(5, 1.0), 2.0)
+    for column in range(5):
+        labels = np.asarray(groups.labels[:, column])
+        for label in np.unique(labels):
+            members = labels == label
+            depth = 4 * float(tau[members, column].sum())  # on the way down and up
+            assert depth < 2 or members.sum() == 1
+
+
+def test_groups_have_sums_and_means():
+    tau, rows = layers()
+    rng = np.random.default_rng(1)
+    uneven = jnp.asarray(rng.uniform(0, 1, tau.shape))
+    groups = grouped(tau, uneven, uneven, jnp.full(5, 2.0), jnp.full(5, 0.02), np.inf)
+    depth, means = merged(groups, tau, rows)
+    for column in range(5):
+        labels = np.asarray(groups.labels[:, column]).astype(int)
+        for k in range(labels.max() + 1):
+            members = labels == k
+            t = np.asarray(tau)[members, column]
+            np.testing.assert_allclose(depth[k, column], t.sum(), rtol=ROUNDING)
+            mean = t @ np.asarray(rows)[members, :, column] / t.sum()
+            np.testing.assert_allclose(means[k, :, column], mean, rtol=ROUNDING)
+
+
+def test_slopes_handed_back_add_up():
+    """Members' slopes times what they have sum to the group's, and a straight line is kept."""
+    tau, rows = layers()
+    allowed = jnp.full(5, np.inf)
+    groups = grouped(tau, rows[:, 0], rows[:, 1], jnp.full(5, 2.0), allowed, np.inf)
+    depth, means = merged(groups, tau, rows)
+    upper, lower = np.linspace(1, 2, 5)[:, None], np.linspace(-1, 3, 5)[:, None]
+    faces = np.zeros((LAYERS + 1, 5, 5))
+    faces[0], faces[1] = upper, lower
+    mean = 0.5 * (upper + lower)
+    row_slopes = np.zeros(rows.shape)
+    row_slopes[0] = mean[1:] * depth[0]
+    tau_slopes = np.zeros(tau.shape)
+    tau_slopes[0] = mean[0] + np.sum(mean[1:] * means[0], axis=0)
+    solved = Solved(depth, means, *(jnp.asarray(x) for x in (tau_slopes, row_slopes, faces)))
+    of_tau, of_rows = handed_back(groups, tau, rows, solved)
+    np.testing.assert_allclose(of_rows.sum(axis=0), row_slopes[0], rtol=1e-12)
+    place = (np.cumsum(tau, axis=0) - 0.5 * tau) / depth[0]
+    line = upper + (lower - upper) * place[:, None]
+    np.testing.assert_allclose(of_rows, tau[:, None] * line[:, 1:], rtol=1e-10, atol=1e-14)
+    wanted = line[:, 0] + np.sum(rows * line[:, 1:], axis=1)
+    np.testing.assert_allclose(of_tau, wanted, rtol=1e-10, atol=1e-13)
+
+
+def test_reaches_rise_with_what_may_be_wrong():
+    coarse, fine = reaches(1e-3), reaches(1e-9)
+    assert all(x > y for x, y in zip(coarse, fine, strict=True))
+    assert list(coarse) == sorted(coarse) and list(fine) == sorted(fine)
