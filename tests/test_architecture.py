@@ -20,7 +20,7 @@ FLOORS = [
     {"bands_of_states"},
     {"band_columns"},
     {"optics", "solver", "surface"},
-    {"microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
+    {"lambertian", "microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
     {"geometry", "planck"},
     {"satellites", "machine"},
