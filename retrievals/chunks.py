@@ -58,8 +58,8 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUN
 def meanwhile(function: Callable[[], Any]) -> Iterator[None]:
     """Run a function on another core beside what the context holds; its result is not wanted.
 
-    What it compiles is there when the context ends: XLA is busy on one core for much of the time
-    that a program takes to compile.
+    What it compiles is there when the context ends: to compile a program keeps one core busy, for
+    much of the time, and leaves the others free.
     """
     x64 = _in_double_precision()
 
