@@ -25,7 +25,7 @@ FLOORS = [
     {"atmosphere"},
     {"geometry", "planck"},
     {"satellites", "machine"},
-    {"_ending", "_numerics", "_version", "bands", "constants", "nomenclature"},
+    {"_ending", "_numerics", "_version", "bands", "constants", "nomenclature", "ranges"},
 ]
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 
