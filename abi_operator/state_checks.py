@@ -100,10 +100,6 @@ def checked_bands(
     """Bands as a tuple, or `ValueError` for one that cannot be simulated of this state."""
     bands = check_bands(bands)
     check_satellite(satellite)
-    if isinstance(gases, str):
-        raise ValueError(
-            f"gases are a sequence of names, such as ({gases!r},); got the string {gases!r}."
-        )
     for name in bands:
         if name not in state.albedo:
             raise ValueError(f"state.albedo has no {name!r}; it holds {list(state.albedo)}.")

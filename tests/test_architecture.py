@@ -19,13 +19,22 @@ FLOORS = [
     {"quality", "radiance", "reflectance"},
     {"optics_and_solver", "state_checks"},
     {"bands_of_states"},
-    {"band_columns"},
+    {"band_columns", "settings"},
     {"optics", "solver", "surface"},
     {"lambertian", "microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
     {"geometry", "planck"},
     {"satellites", "machine"},
-    {"_ending", "_numerics", "_version", "bands", "constants", "nomenclature", "ranges"},
+    {
+        "_ending",
+        "_keywords",
+        "_numerics",
+        "_version",
+        "bands",
+        "constants",
+        "nomenclature",
+        "ranges",
+    },
 ]
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 

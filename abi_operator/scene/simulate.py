@@ -56,7 +56,7 @@ def simulate(
     gases
         Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams
-        Streams of the solver; see `solver.toa_brf`.
+        Streams of the solver; see `solver.Settings`.
     listener
         Is told of columns as they are solved: all that can be in the bands without emission, then
         all that can be in each of the others.
