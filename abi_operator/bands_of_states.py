@@ -15,8 +15,9 @@ from jaxtyping import Array, Float
 
 from .atmosphere import State
 from .band_columns import BandColumns, columns_of_bands
-from .machine.batching import map_tiles, on_every_device, tile_size
+from .machine.batching import map_tiles, on_every_device
 from .machine.door import Leaves
+from .machine.sizes import tile_of_states
 from .machine.slopes import chosen
 from .optics import num_terms
 from .settings import Settings
@@ -31,10 +32,6 @@ _OPAQUE_SSA = 0.96
 # Doublings that are right to 2e-8 for such layers, up to so many streams: against 14 doublings at
 # single-scattering albedos of 0.9 to 1, sun and satellite up to 87 degrees from the zenith.
 _TRACED_DOUBLINGS, _TRACED_STREAMS, _TRACED_MU = 6, 16, 0.05
-# Columns of the solver in a tile, in tiles of the solver: its own loop is inside.
-_SOLVER_TILES = 8
-# States are tiled by so many, which vector units take at a time.
-_VECTOR = 8
 
 
 class Inputs(NamedTuple):
@@ -130,7 +127,7 @@ def _tiled(
     def share(leaves: Leaves) -> Any:
         batch = leaves[0].shape[:num_axes]
         last = [_batch_last(x, num_axes) for x in leaves]
-        width = tile_of_states(leaves, structure, options)
+        width = tile_size(leaves, structure, options)
 
         def outward(x: Array) -> Array:
             x = jnp.moveaxis(x, -1, 0)
@@ -141,11 +138,10 @@ def _tiled(
     return on_every_device(share, leaves, [num_axes > 0] * len(leaves))
 
 
-def tile_of_states(leaves: Leaves, structure: Any, options: Options) -> int:
+def tile_size(leaves: Leaves, structure: Any, options: Options) -> int:
     """States that are solved together."""
-    tile = tile_size(options.settings.num_streams, leaves[0].dtype)
     columns = _num_columns(leaves, structure, options)
-    return _VECTOR * max(1, _SOLVER_TILES * tile // columns // _VECTOR)
+    return tile_of_states(columns, options.settings.num_streams, leaves[0].dtype)
 
 
 def _num_columns(leaves: Leaves, structure: Any, options: Options) -> int:

@@ -18,12 +18,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .band_columns import HARMLESS_ZENITH, columns_of_bands
-from .bands_of_states import Inputs, Options, tile_of_states, values, values_and_slopes
+from .bands_of_states import Inputs, Options, tile_size, values, values_and_slopes
 from .machine.door import Leaves, enter
+from .machine.sizes import chunks_of_states, chunks_to_read
 from .solver import sufficient_doublings
-
-# Columns whose layers are read together, in chunks of one of these.
-_READ_WIDTHS = 1, 64, 1024
 
 
 def solve(inputs: Inputs, options: Options) -> Float[Array, "*batch band"]:
@@ -74,8 +72,7 @@ class _Program(NamedTuple):
         return jax.ShapeDtypeStruct((len(self.options.bands),), leaves[0].dtype)
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        tile = tile_of_states(leaves, self.structure, self.options)
-        return 1, tile, 8 * tile
+        return chunks_of_states(tile_size(leaves, self.structure, self.options))
 
     def value(self, leaves: Leaves) -> Array:
         full, num_axes = _uniform(leaves, self.own_axes)
@@ -105,7 +102,7 @@ class _Depths(NamedTuple):
         return jax.ShapeDtypeStruct((), leaves[0].dtype)
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        return _READ_WIDTHS
+        return 1, *chunks_to_read()
 
     def value(self, leaves: Leaves) -> Array:
         full, num_axes = _uniform(leaves, self.own_axes)

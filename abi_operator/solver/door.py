@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from ..machine.batching import tile_size
 from ..machine.door import Leaves, enter
 from ..machine.independent_columns import independent_columns
+from ..machine.sizes import chunks_of_columns, tile_size
 from ..machine.slopes import slopes_by_reverse_mode
 from .checks import check_arguments, check_in_memory
 from .column import (
@@ -119,10 +119,7 @@ class _Program(NamedTuple):
         )
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        tile = tile_size(self.options.num_streams, leaves[0].dtype)
-        # At few streams a chunk is solved in few times what it needs to begin and to end.
-        brief = self.options.num_streams <= 8
-        return (8, tile, 8 * tile, 16 * tile) if brief else (8, tile, 8 * tile)
+        return chunks_of_columns(self.options.num_streams, leaves[0].dtype)
 
     def value(self, leaves: Leaves) -> Any:
         column = jax.tree.unflatten(self.structure, leaves)
