@@ -35,5 +35,6 @@ from .radiance import brightness_temperature as brightness_temperature
 from .radiance import radiance as radiance
 from .reflectance import brf as brf
 from .reflectance import reflectance_factor as reflectance_factor
+from .settings import Settings as Settings
 from .standard_atmospheres import standard_atmosphere as standard_atmosphere
 from .state_checks import check_state as check_state

@@ -1,8 +1,8 @@
 """How a process of our own ends where it is told to: soon, in one line, with nothing left behind.
 
-Python hears of a signal in its main thread alone, and there between two instructions, not while XLA
-compiles, which is most of a short run. And where Python ends while another thread compiles, it
-waits for that, or XLA crashes. So a thread of its own waits for the numbers of signals
+Python hears of a signal in its main thread alone, and there between two instructions, not while a
+program is compiled, which is most of a short run. And where Python ends while another thread
+compiles, it waits for that, or crashes. So a thread of its own waits for the numbers of signals
 (`signal.set_wakeup_fd`), removes what is unfinished, says why, and ends the process as it stands.
 The main thread stops where the signal reaches it, and writes no more.
 

@@ -14,10 +14,11 @@ from jaxtyping import Array, Float
 
 from .atmosphere import State
 from .bands import AnyName, SomeBand, by_band, entry, several_bands
+from .lambertian import Lambertian
 from .optics import column_optics, num_terms
 from .planck import in_band_radiance
 from .solver import cos_scattering_angle
-from .surface import Lambertian, surface_emission
+from .surface import surface_emission
 
 HARMLESS_ZENITH = 1.0
 """Where a sun or a satellite at or below the horizon stands while columns are solved; what comes of

@@ -15,10 +15,12 @@ from jaxtyping import Array, Float
 
 from .atmosphere import State
 from .band_columns import BandColumns, columns_of_bands
-from .machine.batching import map_tiles, on_every_device, tile_size
+from .machine.batching import map_tiles, on_every_device
 from .machine.door import Leaves
+from .machine.sizes import tile_of_states
 from .machine.slopes import chosen
 from .optics import num_terms
+from .settings import Settings
 from .solver import sufficient_doublings, toa_brf, toa_radiance
 
 TRACED_TAU = 1000.0
@@ -30,10 +32,6 @@ _OPAQUE_SSA = 0.96
 # Doublings that are right to 2e-8 for such layers, up to so many streams: against 14 doublings at
 # single-scattering albedos of 0.9 to 1, sun and satellite up to 87 degrees from the zenith.
 _TRACED_DOUBLINGS, _TRACED_STREAMS, _TRACED_MU = 6, 16, 0.05
-# Columns of the solver in a tile, in tiles of the solver: its own loop is inside.
-_SOLVER_TILES = 8
-# States are tiled by so many, which vector units take at a time.
-_VECTOR = 8
 
 
 class Inputs(NamedTuple):
@@ -60,23 +58,16 @@ class Options(NamedTuple):
         Names of the bands.
     emitting
         Those of them of which the radiance is wanted and not the reflectance.
-    satellite
-        In whose responses they emit.
-    gases, num_streams, num_modes
-        As in `reflectance.brf`.
+    settings
+        How they are simulated.
     """
 
     bands: tuple[str, ...]
     emitting: tuple[str, ...]
-    satellite: str
-    gases: tuple[str, ...]
-    num_streams: int
-    num_modes: int | None
+    settings: Settings
 
 
-def values(
-    leaves: Leaves, structure: Any, options: Options, num_axes: int, num_doublings: int | None
-) -> Array:
+def values(leaves: Leaves, structure: Any, options: Options, num_axes: int) -> Array:
     """Reflectance or radiance ``*batch band`` of states whose leaves have their batch's axes first.
 
     Parameters
@@ -87,12 +78,10 @@ def values(
         How to solve them.
     num_axes
         Axes of the batch.
-    num_doublings
-        Doublings of a layer, at most; None for as many as each needs.
     """
 
     def value(tile: Leaves) -> Array:
-        return _solved(_columns(tile, structure, options), options, num_doublings)
+        return _solved(_columns(tile, structure, options), options)
 
     return _tiled(value, leaves, structure, options, num_axes)
 
@@ -102,15 +91,13 @@ def values_and_slopes(
     structure: Any,
     options: Options,
     num_axes: int,
-    num_doublings: int | None,
     wanted: tuple[bool, ...],
 ) -> tuple[Array, list[Array]]:
     """Values, and the slopes ``*batch band *own`` of the leaves that are wanted.
 
     Without a number of doublings nothing is known of the layers: see `TRACED_TAU`.
     """
-    solved = _solved_unread if num_doublings is None else _solved
-    number = _traced_doublings(options) if num_doublings is None else num_doublings
+    solved = _solved_unread if options.settings.num_doublings is None else _solved
 
     def both(tile: Leaves) -> tuple[Array, Leaves]:
         # Each band has its own copy of what is wanted, so that one pull gives all bands' slopes.
@@ -118,7 +105,7 @@ def values_and_slopes(
             own = iter(copies)
             merged = [next(own) if w else x for x, w in zip(tile, wanted, strict=True)]
             columns = _columns(merged, structure, options, wanted)
-            return solved(columns, options, number)
+            return solved(columns, options)
 
         count = len(options.bands)
         copies = [jnp.broadcast_to(x, (count, *x.shape)) for x in chosen(tile, wanted)]
@@ -140,7 +127,7 @@ def _tiled(
     def share(leaves: Leaves) -> Any:
         batch = leaves[0].shape[:num_axes]
         last = [_batch_last(x, num_axes) for x in leaves]
-        width = tile_of_states(leaves, structure, options)
+        width = tile_size(leaves, structure, options)
 
         def outward(x: Array) -> Array:
             x = jnp.moveaxis(x, -1, 0)
@@ -151,17 +138,16 @@ def _tiled(
     return on_every_device(share, leaves, [num_axes > 0] * len(leaves))
 
 
-def tile_of_states(leaves: Leaves, structure: Any, options: Options) -> int:
+def tile_size(leaves: Leaves, structure: Any, options: Options) -> int:
     """States that are solved together."""
-    tile = tile_size(options.num_streams, leaves[0].dtype)
     columns = _num_columns(leaves, structure, options)
-    return _VECTOR * max(1, _SOLVER_TILES * tile // columns // _VECTOR)
+    return tile_of_states(columns, options.settings.num_streams, leaves[0].dtype)
 
 
 def _num_columns(leaves: Leaves, structure: Any, options: Options) -> int:
     """Columns of the solver that one state is: the exponential terms of all bands."""
     air = jax.tree.unflatten(structure, leaves).state.atmosphere
-    absorbing = options.gases if air.gases is not None else ()
+    absorbing = options.settings.gases if air.gases is not None else ()
     return sum(num_terms(band, absorbing) for band in options.bands)
 
 
@@ -177,6 +163,7 @@ def _columns(
 
     Of leaves that are `copied` each band has its own, along their first axis.
     """
+    settings = options.settings
     flags = [False] * len(tile) if copied is None else copied
 
     def of_one(leaves: Leaves) -> tuple[BandColumns, ...]:
@@ -184,50 +171,46 @@ def _columns(
         return columns_of_bands(
             inputs.state,
             options.bands,
-            options.gases,
-            options.num_streams + 1,
+            settings.gases,
+            settings.num_streams + 1,
             per_band=tuple(jax.tree.unflatten(structure, flags)),
             emitting=options.emitting,
             solar_irradiance=inputs.solar_irradiance,
-            satellite=options.satellite,
+            satellite=settings.satellite,
         )
 
     return jax.vmap(of_one, in_axes=-1)(list(tile))
 
 
-def _solved(
-    groups: Sequence[BandColumns], options: Options, num_doublings: int | None
-) -> Float[Array, "band batch"]:
+def _solved(groups: Sequence[BandColumns], options: Options) -> Float[Array, "band batch"]:
     """One solve for the bands that have the same kind of ground and of light."""
     found = {}
     for columns in groups:
-        found |= columns.summed(_terms(columns, columns.arguments, options, num_doublings))
+        found |= columns.summed(_terms(columns, columns.arguments, options.settings))
     return jnp.stack([found[band] for band in options.bands])
 
 
-def _solved_unread(
-    groups: Sequence[BandColumns], options: Options, num_doublings: int
-) -> Float[Array, "band batch"]:
+def _solved_unread(groups: Sequence[BandColumns], options: Options) -> Float[Array, "band batch"]:
     """The same, with doublings that suffice up to `TRACED_TAU`; beyond it is NaN."""
+    settings = options.settings
+    settings = settings._replace(num_doublings=_traced_doublings(settings.num_streams))
     found = {}
     for columns in groups:
         arguments = columns.arguments | {"tau": _without_depth_of_opaque(columns)}
-        terms = _terms(columns, arguments, options, num_doublings)
+        terms = _terms(columns, arguments, settings)
         thick = jnp.any(arguments["tau"] > TRACED_TAU, axis=-1)
         # A factor, so that slopes are NaN as well.
         found |= columns.summed(terms * jnp.where(thick, jnp.nan, 1).astype(terms.dtype))
     return jnp.stack([found[band] for band in options.bands])
 
 
-def _terms(
-    columns: BandColumns, arguments: dict[str, Any], options: Options, num_doublings: int | None
-) -> Array:
+def _terms(columns: BandColumns, arguments: dict[str, Any], settings: Settings) -> Array:
     door = toa_radiance if columns.emit else toa_brf
     return door(
         **arguments,
-        num_streams=options.num_streams,
-        num_modes=options.num_modes,
-        num_doublings=num_doublings,
+        num_streams=settings.num_streams,
+        num_modes=settings.num_modes,
+        num_doublings=settings.num_doublings,
     )
 
 
@@ -241,8 +224,8 @@ def _without_depth_of_opaque(columns: BandColumns) -> Array:
     return tau if columns.emit else jnp.where(ssa <= _OPAQUE_SSA, jnp.minimum(tau, TRACED_TAU), tau)
 
 
-def _traced_doublings(options: Options) -> int:
+def _traced_doublings(num_streams: int) -> int:
     """Enough for layers up to `TRACED_TAU`."""
-    if options.num_streams <= _TRACED_STREAMS:
+    if num_streams <= _TRACED_STREAMS:
         return _TRACED_DOUBLINGS
-    return sufficient_doublings(TRACED_TAU, _TRACED_MU, options.num_streams)
+    return sufficient_doublings(TRACED_TAU, _TRACED_MU, num_streams)

@@ -18,30 +18,25 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .band_columns import HARMLESS_ZENITH, columns_of_bands
-from .bands_of_states import Inputs, Options, tile_of_states, values, values_and_slopes
+from .bands_of_states import Inputs, Options, tile_size, values, values_and_slopes
 from .machine.door import Leaves, enter
+from .machine.sizes import chunks_of_states, chunks_to_read
 from .solver import sufficient_doublings
 
-# Columns whose layers are read together, in chunks of one of these.
-_READ_WIDTHS = 1, 64, 1024
 
-
-def solve(
-    inputs: Inputs, options: Options, num_doublings: int | None = None
-) -> Float[Array, "*batch band"]:
+def solve(inputs: Inputs, options: Options) -> Float[Array, "*batch band"]:
     """Reflectance of each column in each band, or radiance in those that emit. [-], [W m-2 ...]
 
     Parameters
     ----------
     inputs, options
-        What the columns are and how to solve them.
-    num_doublings
-        Doublings of a layer, at most; None sets no limit to values (see above).
+        What the columns are and how to solve them. Without a number of doublings there is no limit
+        to those of values (see above).
     """
     leaves, structure = jax.tree.flatten(inputs)
     num_axes = inputs.state.geometry.solar_zenith.ndim
     own_axes = tuple(x.ndim - num_axes for x in leaves)
-    return enter(_Program(structure, options, own_axes, num_doublings), leaves)
+    return enter(_Program(structure, options, own_axes), leaves)
 
 
 class _Program(NamedTuple):
@@ -50,22 +45,25 @@ class _Program(NamedTuple):
     structure: Any
     options: Options
     own_axes: tuple[int, ...]
-    num_doublings: int | None
 
     def known(self, leaves: Leaves, what: Any) -> "_Program":
-        if what == "value" or self.num_doublings is not None:
+        settings = self.options.settings
+        if what == "value" or settings.num_doublings is not None:
             return self
         geometry = jax.tree.unflatten(self.structure, leaves).state.geometry
         angles = [np.asarray(x) for x in (geometry.solar_zenith, geometry.view_zenith)]
         if angles[0].size == 0:
-            return self._replace(num_doublings=0)
+            return self._doubling(0)
         depths = enter(_Depths(self.structure, self.options, self.own_axes), leaves)
         steepest = (np.max(np.where(np.cos(x) > 0, x, HARMLESS_ZENITH)) for x in angles)
         cosine = max(float(np.cos(max(steepest))), float(np.finfo(np.float32).eps))
         depths = np.asarray(depths)  # columns that are not finite are NaN, however they are solved
         thickest = float(np.max(depths, where=np.isfinite(depths), initial=0))
-        number = sufficient_doublings(thickest, cosine, self.options.num_streams)
-        return self._replace(num_doublings=number)
+        return self._doubling(sufficient_doublings(thickest, cosine, settings.num_streams))
+
+    def _doubling(self, number: int) -> "_Program":
+        settings = self.options.settings._replace(num_doublings=number)
+        return self._replace(options=self.options._replace(settings=settings))
 
     def unknown(self, what: Any) -> "_Program":
         return self
@@ -74,20 +72,17 @@ class _Program(NamedTuple):
         return jax.ShapeDtypeStruct((len(self.options.bands),), leaves[0].dtype)
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        tile = tile_of_states(leaves, self.structure, self.options)
-        return 1, tile, 8 * tile
+        return chunks_of_states(tile_size(leaves, self.structure, self.options))
 
     def value(self, leaves: Leaves) -> Array:
         full, num_axes = _uniform(leaves, self.own_axes)
-        return values(full, self.structure, self.options, num_axes, self.num_doublings)
+        return values(full, self.structure, self.options, num_axes)
 
     def value_and_slopes(
         self, leaves: Leaves, wanted: tuple[bool, ...]
     ) -> tuple[Array, list[Array]]:
         full, num_axes = _uniform(leaves, self.own_axes)
-        return values_and_slopes(
-            full, self.structure, self.options, num_axes, self.num_doublings, wanted
-        )
+        return values_and_slopes(full, self.structure, self.options, num_axes, wanted)
 
 
 class _Depths(NamedTuple):
@@ -107,15 +102,16 @@ class _Depths(NamedTuple):
         return jax.ShapeDtypeStruct((), leaves[0].dtype)
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        return _READ_WIDTHS
+        return 1, *chunks_to_read()
 
     def value(self, leaves: Leaves) -> Array:
         full, num_axes = _uniform(leaves, self.own_axes)
 
         def of_one(leaves: Leaves) -> Array:
             state = jax.tree.unflatten(self.structure, leaves).state
-            names, gases = self.options.bands, self.options.gases
-            groups = columns_of_bands(state, names, gases, self.options.num_streams + 1)
+            settings = self.options.settings
+            num_moments = settings.num_streams + 1
+            groups = columns_of_bands(state, self.options.bands, settings.gases, num_moments)
             return jnp.max(jnp.stack([jnp.max(x.arguments["tau"]) for x in groups]))
 
         for _ in range(num_axes):

@@ -14,13 +14,11 @@ from .atmosphere import State
 from .band_columns import above_horizon, ground_of
 from .bands import BANDS, GRASSO2013
 from .machine.batching import map_tiles
+from .machine.sizes import tile_of_grounds
 from .nomenclature import GRAZING_ZENITH, LARGEST_SHARE_OUTSIDE, QUALITY_FLAGS
 from .optics import outside_fitted_range as outside_of_column
 from .state_checks import checked_bands, uniform
 from .surface import Report, reported
-
-# Columns whose grounds are looked at together, from some 2000 views.
-_TILE = 64
 
 
 def quality_flags(state: State, bands: Sequence[str] = GRASSO2013) -> UInt8[Array, "*batch"]:
@@ -133,5 +131,5 @@ def _flags(state: State, bands: tuple[str, ...]) -> Array:
 def _reported(ground: Any, mu0: Array) -> Report:
     """`surface.reported`, tile by tile."""
     flat = jax.tree.map(jnp.ravel, (ground, mu0))
-    found = map_tiles(lambda x: reported(*x), flat, _TILE)
+    found = map_tiles(lambda x: reported(*x), flat, tile_of_grounds())
     return jax.tree.map(lambda x: x.reshape(mu0.shape), found)

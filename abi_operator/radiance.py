@@ -5,17 +5,19 @@ simulated as radiance. Sunlight and emission are one solve.
 """
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ._keywords import with_keywords
 from .atmosphere import State
 from .bands import GRASSO2013
-from .optics import ALL_GASES
 from .optics_and_solver import Inputs, Options, solve
 from .planck import brightness_temperature as temperature_of
 from .satellites import solar_irradiance
+from .settings import ByName, Settings, settings_of
 from .state_checks import check_state, checked_bands, is_concrete, uniform
 
 THERMAL = ("C07",)
@@ -25,16 +27,13 @@ FIRE_BANDS = ("C05", "C06", "C07")
 4e-5 of the sun's light from a ground of 300 K."""
 
 
+@with_keywords(ByName, Settings())
 def radiance(
     state: State,
     bands: Sequence[str] = (*GRASSO2013, "C07"),
     *,
-    satellite: str = "GOES-16",
     sun_distance: Float[Array, "*batch"] | float = 1.0,
-    gases: Sequence[str] = ALL_GASES,
-    num_streams: int = 8,
-    num_modes: int | None = None,
-    num_doublings: int | None = None,
+    **settings: Unpack[ByName],
 ) -> Float[Array, "*batch band"]:
     r"""Radiance at the top of the atmosphere, by band, before any limit. [W m-2 sr-1 um-1]
 
@@ -51,12 +50,10 @@ def radiance(
     bands
         Names of the bands, each present in the state's albedo and plumes. C07 needs temperatures
         of the levels and of the ground; so do C05 and C06 where there is a fire.
-    satellite
-        Whose solar irradiance and response; optics are those of GOES-16.
     sun_distance
         Distance of the sun. [AU]
-    gases, num_streams, num_modes, num_doublings
-        As in `brf`.
+    **settings
+        Satellite, gases and accuracy: the fields of `Settings`.
 
     Returns
     -------
@@ -68,7 +65,8 @@ def radiance(
         As `brf`, and if a temperature is missing, the satellite unknown, or the fit of gas
         absorption not made for the satellite's band (C04 of GOES-19).
     """
-    bands = checked_bands(state, bands, gases, satellite)
+    how = settings_of(settings)
+    bands = checked_bands(state, bands, how.gases, how.satellite)
     emitting = [x for x in bands if x in (THERMAL if state.fire is None else FIRE_BANDS)]
     missing = [
         name
@@ -85,9 +83,9 @@ def radiance(
         check_state(state)
     mu0 = state.geometry.mu0
     share = jnp.where(mu0 > 0, 1 / jnp.asarray(sun_distance, mu0.dtype) ** 2, 0)
-    sun = {x: solar_irradiance(x, satellite) * share for x in bands}
-    options = Options(bands, tuple(emitting), satellite, tuple(gases), num_streams, num_modes)
-    found = solve(Inputs(state, {x: sun[x] for x in emitting}), options, num_doublings)
+    sun = {x: solar_irradiance(x, how.satellite) * share for x in bands}
+    options = Options(bands, tuple(emitting), how)
+    found = solve(Inputs(state, {x: sun[x] for x in emitting}), options)
     # What is no emission is the sun's times its cosine, which may be below 0 only where it is 0.
     reflected = jnp.where(mu0 > 0, mu0 / np.pi, 0)
     factor = [jnp.ones_like(mu0) if x in emitting else sun[x] * reflected for x in bands]
@@ -95,15 +93,19 @@ def radiance(
     return jnp.where(seen[..., None], found * jnp.stack(factor, axis=-1), jnp.nan)
 
 
+@with_keywords(ByName, Settings())
 def brightness_temperature(
-    state: State, *, satellite: str = "GOES-16", **options
+    state: State,
+    *,
+    sun_distance: Float[Array, "*batch"] | float = 1.0,
+    **settings: Unpack[ByName],
 ) -> Float[Array, "*batch"]:
     """Temperature of the black body that C07 would take a column for. [K]
 
     Parameters
     ----------
-    state, satellite, options
+    state, sun_distance, **settings
         As in `radiance`.
     """
-    seen = radiance(state, ("C07",), satellite=satellite, **options)
-    return temperature_of(seen[..., 0], "C07", satellite)
+    seen = radiance(state, ("C07",), sun_distance=sun_distance, **settings)
+    return temperature_of(seen[..., 0], "C07", settings_of(settings).satellite)

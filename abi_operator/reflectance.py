@@ -8,27 +8,25 @@ are of sunlight alone: what the ground and the air emit in C07 is not in them.
 """
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ._keywords import with_keywords
 from .atmosphere import State
 from .bands import GRASSO2013
-from .optics import ALL_GASES
 from .optics_and_solver import Inputs, Options, solve
+from .settings import ByName, Settings, settings_of
 from .state_checks import check_state, checked_bands, is_concrete, uniform
 
 
+@with_keywords(ByName, Settings())
 def brf(
     state: State,
     bands: Sequence[str] = GRASSO2013,
-    *,
-    satellite: str = "GOES-16",
-    gases: Sequence[str] = ALL_GASES,
-    num_streams: int = 8,
-    num_modes: int | None = None,
-    num_doublings: int | None = None,
+    **settings: Unpack[ByName],
 ) -> Float[Array, "*batch band"]:
     """Bidirectional reflectance factor at the top of the atmosphere, by band. [-]
 
@@ -42,15 +40,8 @@ def brf(
         One column, or a batch of columns: the same axes leading on every leaf.
     bands
         Names of the bands to simulate, each present in the state's albedo and plumes.
-    satellite
-        Optics are those of GOES-16 for all; that of GOES-19 is refused where its gas absorption is
-        another (C04).
-    gases
-        Which of the atmosphere's gases absorb; ``()`` leaves them all out.
-    num_streams, num_modes, num_doublings
-        Accuracy and cost of the solver; see `solver.toa_brf`. With `num_doublings` None every layer
-        is exact, but for derivatives inside `jax.jit` and loops, where optical depths cannot be
-        read: columns with a layer thicker than 1000 are NaN there.
+    **settings
+        Satellite, gases and accuracy: the fields of `Settings`.
 
     Returns
     -------
@@ -62,44 +53,27 @@ def brf(
         If a band or the satellite is unknown, a band missing from the state, a leaf's axes do not
         match, or (where values can be read) as `check_state`.
     """
-    options = Options(
-        checked_bands(state, bands, gases, satellite),
-        (),
-        satellite,
-        tuple(gases),
-        num_streams,
-        num_modes,
-    )
+    how = settings_of(settings)
+    bands = checked_bands(state, bands, how.gases, how.satellite)
+    options = Options(bands, (), how)
     state, _ = uniform(state)
     if is_concrete(state):
         check_state(state)
-    value = solve(Inputs(state, {}), options, num_doublings)
+    value = solve(Inputs(state, {}), options)
     return _lit(value, state.geometry.solar_zenith, state.geometry.view_zenith)
 
 
+@with_keywords(ByName, Settings())
 def reflectance_factor(
     state: State,
     bands: Sequence[str] = GRASSO2013,
-    *,
-    satellite: str = "GOES-16",
-    gases: Sequence[str] = ALL_GASES,
-    num_streams: int = 8,
-    num_modes: int | None = None,
-    num_doublings: int | None = None,
+    **settings: Unpack[ByName],
 ) -> Float[Array, "*batch band"]:
     """Reflectance factor pi d^2 L / E0 as in ABI files, mu0 times `brf`, and 0 by night. [-]
 
     Arguments and errors are those of `brf`; where the satellite is out of sight it is NaN.
     """
-    value = brf(
-        state,
-        bands,
-        satellite=satellite,
-        gases=gases,
-        num_streams=num_streams,
-        num_modes=num_modes,
-        num_doublings=num_doublings,
-    )
+    value = brf(state, bands, **settings)
     return _with_the_suns_cosine(value, state.geometry.solar_zenith, state.geometry.view_zenith)
 
 

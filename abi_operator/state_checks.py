@@ -11,48 +11,8 @@ from jax.core import Tracer
 from .atmosphere import State
 from .bands import check_bands
 from .machine.algebra import converted
+from .ranges import FINITE, STATE
 from .satellites import check_satellite, gas_fit_covers
-
-_INF = float("inf")
-_NOT_NEGATIVE = (0.0, _INF, "0 or more")
-_POSITIVE = (np.nextafter(0.0, 1.0), _INF, "above 0")
-_SHARE = (0.0, 1.0, "0 to 1")
-_ZENITH = (0.0, np.pi, "0 to pi (angles are in rad)")
-# A difference of two azimuths is 2 pi at most, in float32 too; what is more is degrees.
-_AZIMUTH = (-6.2832, 6.2832, "-2 pi to 2 pi (angles are in rad)")
-# At either end all light is scattered into one direction, for which there is no phase function.
-_ASYMMETRY = (np.nextafter(-1.0, 0.0), np.nextafter(1.0, 0.0), "above -1 and below 1")
-_ANY = (-_INF, _INF, "finite")
-
-# Range of the fields that have the same one wherever they are: smallest and largest value, and how
-# to say so. Every field is finite.
-_RANGES: dict[str, tuple[float, float, str]] = {
-    "pressure": _NOT_NEGATIVE,
-    "temperature": _POSITIVE,
-    "surface_temperature": _POSITIVE,
-    "height": _ANY,
-    "mass_path": _NOT_NEGATIVE,
-    "number_path": _NOT_NEGATIVE,
-    "vapour": _NOT_NEGATIVE,
-    "ozone": _NOT_NEGATIVE,
-    "carbon_dioxide": _SHARE,
-    "methane": _SHARE,
-    "nitrous_oxide": _SHARE,
-    "base": _NOT_NEGATIVE,
-    "top": _NOT_NEGATIVE,
-    "extinction_550": _NOT_NEGATIVE,
-    "brightness": _SHARE,
-    "relative_extinction": _NOT_NEGATIVE,
-    "ssa": _SHARE,
-    "asymmetry": _ASYMMETRY,
-    "effective_radius_um": _POSITIVE,
-    "fraction": _SHARE,
-    "albedo": _SHARE,
-    "wind_speed": _NOT_NEGATIVE,
-    "solar_zenith": _ZENITH,
-    "view_zenith": _ZENITH,
-    "relative_azimuth": _AZIMUTH,
-}
 
 # Pressure at the ground where there is air: far from what the same air has in hPa. [Pa]
 _GROUND_PRESSURE = 2e3, 1.2e5
@@ -66,7 +26,7 @@ _SMALLEST_RATIO = 1.05
 
 
 def check_state(state: State) -> None:
-    """Refuse a state that cannot be: every value in its range, levels in order, edges too.
+    """Refuse a state that cannot be: values in their ranges (`ranges.STATE`), levels in order.
 
     Values are read with NumPy, one column or a batch. `brf`, `reflectance_factor` and `radiance`
     call it where there are values to read; under `jax.jit` and in derivatives there are none, and
@@ -83,10 +43,9 @@ def check_state(state: State) -> None:
     """
     num_axes = np.ndim(state.geometry.solar_zenith)
     for path, leaf in jax.tree_util.tree_leaves_with_path(state):
-        low, high, words = _RANGES.get(_field(path), _ANY)
+        allowed = STATE.get(_field(path), FINITE)
         x = np.asarray(leaf)
-        bad = ~((x >= low) & (x <= high) & np.isfinite(x))
-        _refuse(bad, x, f"state{jax.tree_util.keystr(path)}", f"{words}", num_axes)
+        _refuse(~allowed.holds(x), x, f"state{jax.tree_util.keystr(path)}", allowed.words, num_axes)
     air = state.atmosphere
     steps = np.diff(np.asarray(air.pressure), axis=-1)
     _refuse(steps < 0, steps, "state.atmosphere.pressure, from level to level", _RISING, num_axes)
@@ -141,10 +100,6 @@ def checked_bands(
     """Bands as a tuple, or `ValueError` for one that cannot be simulated of this state."""
     bands = check_bands(bands)
     check_satellite(satellite)
-    if isinstance(gases, str):
-        raise ValueError(
-            f"gases are a sequence of names, such as ({gases!r},); got the string {gases!r}."
-        )
     for name in bands:
         if name not in state.albedo:
             raise ValueError(f"state.albedo has no {name!r}; it holds {list(state.albedo)}.")

@@ -3,13 +3,12 @@
     python benchmarks/layout.py [--repeats 5]
 
 prints microseconds per layer and azimuth mode of the solver against the tile of columns that stays
-in the cache (`abi_operator.machine.batching`), and seconds of a retrieval against the chunk of
-pixels that waits for its slowest member (`retrievals.chunks`). Float64; compiling apart.
+in the cache, and seconds of a retrieval against the chunk of pixels that waits for its slowest
+member (both in `abi_operator.machine.sizes`). Float64; compiling apart.
 """
 
 import argparse
 import statistics
-import sys
 import tempfile
 import time
 from functools import partial
@@ -21,13 +20,13 @@ from first_light import read
 
 import retrievals.pixels
 from abi_operator.demo import write_demo
+from abi_operator.machine import sizes
 from abi_operator.scene import simulate
-from abi_operator.solver import toa_brf
+from abi_operator.solver import door, toa_brf
 from retrievals import retrieve_smoke
 from retrievals.chunks import map_chunks
 
 NUM_COLUMNS, NUM_LAYERS, NUM_DOUBLINGS = 1024, 24, 2
-SOLVER = sys.modules["abi_operator.solver.toa_brf"]
 
 
 def columns(num_streams):
@@ -53,14 +52,15 @@ def median_seconds(function, repeats):
 
 
 def solver_tiles(repeats):
-    tiles = (16, 32, 64, 128, 256, NUM_COLUMNS)
-    print(f"| streams | {' | '.join(f'{t} columns' for t in tiles[:-1])} | no tiles |")
+    tiles = (16, 32, 64, 128)  # no larger ones: a layer of 16 streams would be no kernel any more
+    print(f"| streams | {' | '.join(f'{t} columns' for t in tiles)} |")
     print("| --- |" + " --- |" * len(tiles))
     for num_streams in (4, 8, 16):
         arguments = columns(num_streams)
         cells = []
         for tile in tiles:
-            SOLVER.tile_size = lambda *_, tile=tile, **__: tile
+            for room in (sizes, door):
+                room.tile_size = lambda *_, tile=tile: tile
             jax.clear_caches()
             solve = partial(
                 toa_brf, *arguments, num_streams=num_streams, num_doublings=NUM_DOUBLINGS

@@ -20,7 +20,7 @@ import workload
 from rounds import table
 
 from abi_operator.machine.algebra import matmul
-from abi_operator.machine.batching import tile_size
+from abi_operator.machine.sizes import tile_size
 
 LAYERS = 20
 

@@ -10,17 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
+from abi_operator.machine.sizes import chunk_of_pixels
 from abi_operator.machine.speed import usable_cores
 
 T = TypeVar("T")
 
-CHUNK = 16
-"""Pixels that are solved together. A minimisation lasts until the slowest of them is done, and the
-matrices of many columns leave the cache: 196 pixels of three bands took 3.1, 3.5, 3.8 and 4.8 s on
-two cores in chunks of 16, 32, 48 and 96 (`benchmarks/layout.py`)."""
 
-
-def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUNK) -> T:
+def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int | None = None) -> T:
     """Apply a compiled, batched function to all pixels.
 
     Parameters
@@ -31,12 +27,13 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUN
         Arrays of all pixels, one pixel or more. The last chunk is filled up with copies of the
         last pixel, so that one program serves all.
     chunk
-        Pixels a chunk.
+        Pixels a chunk; None for those that are retrieved together.
 
     Returns
     -------
     What `function` returns, for all pixels, as NumPy arrays.
     """
+    chunk = chunk_of_pixels() if chunk is None else chunk
     num_pixels = jax.tree.leaves(arguments)[0].shape[0]
     arguments = jax.tree.map(np.asarray, arguments)
     starts = range(0, num_pixels, chunk)
@@ -58,8 +55,8 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int = CHUN
 def meanwhile(function: Callable[[], Any]) -> Iterator[None]:
     """Run a function on another core beside what the context holds; its result is not wanted.
 
-    What it compiles is there when the context ends: XLA is busy on one core for much of the time
-    that a program takes to compile.
+    What it compiles is there when the context ends: to compile a program keeps one core busy, for
+    much of the time, and leaves the others free.
     """
     x64 = _in_double_precision()
 

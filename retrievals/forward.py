@@ -10,15 +10,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from abi_operator import BANDS, Atmosphere, Plume, State, reflectance_factor
+from abi_operator.machine.sizes import chunk_of_pixels_to_read
 from abi_operator.machine.speed import Kept
 from abi_operator.optics import ALL_GASES, column_optics
 from abi_operator.solver import sufficient_doublings
 
 from .chunks import map_chunks
 from .state_vector import StateVector
-
-# Columns of which the thickest layers are read in one call.
-_READ_TOGETHER = 256
 
 
 class ForwardModel(eqx.Module):
@@ -81,7 +79,8 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
     states
         Concrete columns, batched along one leading axis.
     """
-    max_tau = np.max(map_chunks(partial(_largest_tau, forward), states, chunk=_READ_TOGETHER))
+    chunk = chunk_of_pixels_to_read()
+    max_tau = np.max(map_chunks(partial(_largest_tau, forward), states, chunk=chunk))
     min_mu = min(
         np.min(np.cos(x)) for x in (states.geometry.solar_zenith, states.geometry.view_zenith)
     )

@@ -9,9 +9,10 @@ import jax
 import numpy as np
 
 from abi_operator import State
+from abi_operator.machine.sizes import chunk_of_pixels
 from abi_operator.machine.speed import Kept
 
-from .chunks import CHUNK, map_chunks, meanwhile
+from .chunks import map_chunks, meanwhile
 from .first_guess import candidates, guesses, scan
 from .forward import ForwardModel
 from .inverse import DEFAULT_MINIMISER, Inversion, Minimiser, invert
@@ -81,9 +82,10 @@ def _in_rounds(
 
 def _first_chunk(observations: Observation, states: State, starts: np.ndarray) -> tuple[Any, ...]:
     """Pixels for which the program that minimises is compiled while another one scans."""
-    rows = np.minimum(np.arange(CHUNK), len(observations.sigma) - 1)
+    chunk = chunk_of_pixels()
+    rows = np.minimum(np.arange(chunk), len(observations.sigma) - 1)
     some = jax.tree.map(lambda x: np.asarray(x)[rows], (observations, states))
-    return *some, np.repeat(starts[:1], CHUNK, axis=0)
+    return *some, np.repeat(starts[:1], chunk, axis=0)
 
 
 def _minimise(

@@ -1,6 +1,7 @@
 """The house: imports go down, never sideways or up, and the door opens with JAX alone."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,13 +19,22 @@ FLOORS = [
     {"quality", "radiance", "reflectance"},
     {"optics_and_solver", "state_checks"},
     {"bands_of_states"},
-    {"band_columns"},
+    {"band_columns", "settings"},
     {"optics", "solver", "surface"},
-    {"microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
+    {"lambertian", "microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
     {"geometry", "planck"},
     {"satellites", "machine"},
-    {"_ending", "_numerics", "_version", "bands", "constants", "nomenclature"},
+    {
+        "_ending",
+        "_keywords",
+        "_numerics",
+        "_version",
+        "bands",
+        "constants",
+        "nomenclature",
+        "ranges",
+    },
 ]
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 
@@ -77,6 +87,20 @@ def test_rooms_that_have_not_heard_of_each_other():
             words = " ".join(text.split())
             assert "aerosol" not in words.replace("knows nothing of aerosols", ""), path
         assert "retrievals" not in [n.split(".")[0] for n in absolute(path)], path
+
+
+# Whose words about the compiler still stand beside the steps that they are about.
+SPEAK_OF_THE_COMPILER = "machine", "solver/method", "solver/gradient", "solver/program.py"
+
+
+def test_the_compiler_is_spoken_of_in_the_machine_alone():
+    """Whoever reads physics need not know by what a program becomes machine code."""
+    words = re.compile("(?<![a-z])(xla|llvm)(?![a-z])", re.IGNORECASE)  # and not WRF's XLAT
+    for path in [*sources("abi_operator"), *sources("retrievals")]:
+        exempt = [ROOT / "abi_operator" / place for place in SPEAK_OF_THE_COMPILER]
+        if not any(place in (path, *path.parents) for place in exempt):
+            found = words.search(path.read_text())
+            assert not found, f"{path} speaks of {found[0]}"
 
 
 def absolute(path: Path) -> list[str]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..nomenclature import HYDROMETEORS
+from ..ranges import SHARE, WEATHER
 from .errors import InputError
 
 # What NetCDF's library puts where a float or double was never written (NC_FILL_FLOAT in netcdf.h).
@@ -55,9 +56,13 @@ _OTHER_MOST_NUMBER = 1e10
 _LARGEST_RADIUS = {"cloud": 1e-3, "ice": 1e-3, "rain": 1e-2, "snow": 1e-2, "graupel": 1e-2}
 _LARGEST_RADIUS |= {"hail": 0.1}
 
+_SHARES = "surface_emissivity", "land_mask", "broadband_albedo", "sea_ice", "snow_cover"
+
 PLAUSIBLE: dict[str, Range] = {
-    "latitude": Range(-90, 90),
-    "longitude": Range(-360, 360),
+    **{
+        name: Range(*WEATHER[name][:2]) for name in ("latitude", "longitude", "surface_temperature")
+    },
+    **{name: Range(*SHARE[:2]) for name in _SHARES},
     # From 80 km to the shore of the Dead Sea, where it is 1070 hPa.
     "layer_pressure": Range(1.0, 1.1e5),
     # From the top of Mount Everest, where it is 330 hPa.
@@ -66,14 +71,7 @@ PLAUSIBLE: dict[str, Range] = {
     # From the mesopause to air that a fire has heated; cloud tops have been seen at 162 K (Proud
     # and Bachmeier 2021, doi:10.1029/2020GL092261), the polar stratosphere is at 180 K.
     "layer_temperature": Range(130.0, 500.0),
-    # From the Antarctic plateau, at 175 K (Scambos et al. 2018, doi:10.1029/2018GL078133), to lava.
-    "surface_temperature": Range(150.0, 1500.0),
-    "surface_emissivity": Range(0, 1),
-    "land_mask": Range(0, 1),
-    "broadband_albedo": Range(0, 1),
     "land_use": Range(0, 255),  # of one byte in the files that models take it from
-    "sea_ice": Range(0, 1),
-    "snow_cover": Range(0, 1),
     "snow_mass": Range(0, 1e5),  # ice sheets, where a model does not stop counting before
     # A dew point of 43 degrees C at 1000 hPa; the highest observed, in Dhahran on 8 July 2003, is
     # 35, which is 0.037 kg kg-1.

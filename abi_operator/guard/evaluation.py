@@ -10,6 +10,7 @@ import numpy as np
 
 from ..atmosphere import Plume, State
 from ..bands import BANDS, check_bands
+from ..machine.compiler import SOON_COMPILED
 from ..radiance import FIRE_BANDS, THERMAL, radiance
 from ..reflectance import brf
 from ..state_checks import check_state
@@ -22,10 +23,6 @@ layers of an optical depth up to 6000."""
 QUANTITIES = {"brf": brf, "radiance": radiance}
 """The operators that are guarded."""
 UNITS = {"brf": "1", "radiance": "W m-2 sr-1 um-1"}
-
-# The programs run for milliseconds and are compiled for a minute; without optimisation it is half
-# of that. What it does to results is rounding.
-_COMPILER_OPTIONS = {"xla_backend_optimization_level": 0}
 
 
 class Request(NamedTuple):
@@ -178,9 +175,8 @@ def values_and_jacobian(
     return value, jax.lax.map(lambda cotangent: pull_back(cotangent)[0], one_band)
 
 
-_compiled = jax.jit(
-    values_and_jacobian, static_argnums=(1, 2, 3), compiler_options=_COMPILER_OPTIONS
-)
+# The programs run for milliseconds and are compiled for a minute.
+_compiled = jax.jit(values_and_jacobian, static_argnums=(1, 2, 3), compiler_options=SOON_COMPILED)
 
 
 def _of_batch(names: Sequence[str], batch: State, request: Request) -> dict[str, dict[str, Any]]:

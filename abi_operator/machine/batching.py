@@ -1,8 +1,7 @@
-"""Which layout runs at which size.
+"""Tiles of columns, one after the other, on every device of a CPU.
 
 Kernels have their batch last and work on one tile of columns at a time, small enough that the
-matrices of a layer stay in the cache and large enough to fill the vector units
-(`benchmarks/layout.py` measures it).
+matrices of a layer stay in the cache and large enough to fill the vector units (`sizes`).
 
 XLA runs the loop over tiles on one core: its loops share their temporary memory and so follow each
 other, however a program is written. It does run several CPU devices at a time, and where JAX has
@@ -26,27 +25,9 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array
 
-# A vector unit holds at most so many float64; tiles narrower than a few of these leave it idle.
-_VECTOR = 8
-_FEWEST_A_DEVICE = 4 * _VECTOR
-# A GPU has no cache to keep a tile in, but many units to fill; this bounds its memory alone.
-_GPU_TILE = 4096
+from .sizes import VECTOR
 
-
-def tile_size(num_streams: int, dtype: Any) -> int:
-    """Columns that are solved together, at most.
-
-    The fewer, the more of a layer is in the cache next to the processor; the more, the less the
-    start of a kernel counts; below 64 LLVM unrolls short loops over them number by number, without
-    vectors (`algebra.weighted_rows` has what was done about it). Where a layer is one kernel
-    (`kernels`) a tile is also small enough for that.
-    """
-    if jax.default_backend() != "cpu":
-        return _GPU_TILE
-    single = jnp.dtype(dtype) == jnp.float32
-    if num_streams > 16:
-        return 64 if single else 32
-    return 128 if single and num_streams > 8 else 64
+_FEWEST_A_DEVICE = 4 * VECTOR
 
 
 def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
@@ -154,5 +135,5 @@ def _equal_tiles(size: int, tile: int, num_devices: int) -> tuple[int, int]:
     """Number of tiles, the same for every device, and their width: as narrow as the number lets."""
     share = math.ceil(size / num_devices)
     count = max(1, math.ceil(share / tile))
-    width = min(tile, _VECTOR * math.ceil(share / count / _VECTOR))
+    width = min(tile, VECTOR * math.ceil(share / count / VECTOR))
     return count * num_devices, width

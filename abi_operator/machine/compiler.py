@@ -23,6 +23,10 @@ _WIDTH, _EMITTERS = "xla_cpu_prefer_vector_width", "xla_cpu_use_fusion_emitters"
 _EXTRA = "xla_backend_extra_options"
 _LEAN = "xla_cpu_disable_new_fusion_emitters=true,xla_cpu_disable_loop_unrolling=true"
 
+SOON_COMPILED: dict[str, int | bool] = {"xla_backend_optimization_level": 0}
+"""Options of `jax.jit` for programs that are compiled for longer than they will ever run: compiled
+without optimisation, in half the time. What that does to results is rounding."""
+
 
 def options() -> dict[str, int | bool]:
     """Options of `jax.jit`."""

@@ -3,7 +3,7 @@
 Every number of the published optics can be replaced.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -14,6 +14,7 @@ from jax.typing import ArrayLike
 
 from ..atmosphere import MiePlume, Plume
 from ..bands import GRASSO2013, check_bands
+from ..ranges import STATE
 from .aerosol_tables import ASH, SMOKE, AerosolOptics
 from .mie_table import mie_table
 
@@ -52,7 +53,7 @@ def smoke(
     Raises
     ------
     ValueError
-        Where a value is out of its range, unless it is traced.
+        Where a value is out of its range (`ranges.STATE`), unless it is traced.
 
     References
     ----------
@@ -128,8 +129,7 @@ def mie_plume(
     mie_table(species)
     extent = {"aod_550": aod_550, "brightness": brightness, "base": base, "top": top}
     plume = _broadcast(extent | {"effective_radius_um": effective_radius_um})
-    _check_extent(species, plume)
-    _check(species, "effective_radius_um", "above 0", plume["effective_radius_um"] > 0)
+    _check(species, plume)
     return MiePlume(
         base=plume["base"],
         top=plume["top"],
@@ -157,8 +157,7 @@ def _plume(
             raise ValueError(f"{name} of {species} is given in {unknown}, outside {bands=}.")
         optics[name] = {band: values.get(band, getattr(published, name)[band]) for band in bands}
     plume = _broadcast(extent | optics)
-    _check_extent(species, plume)
-    _check_optics(species, plume)
+    _check(species, plume)
     return Plume(
         base=plume["base"],
         top=plume["top"],
@@ -183,24 +182,25 @@ def _read(plume: dict) -> dict:
     return jax.tree.map(lambda x: x if isinstance(x, Tracer) else np.asarray(x), plume)
 
 
-def _check(species: str, name: str, requirement: str, holds: Any) -> None:
-    """Raise `ValueError` naming a quantity that is out of range, unless it is traced."""
-    if not isinstance(holds, Tracer) and not np.all(holds):
-        raise ValueError(f"{name} of {species} must be {requirement}.")
-
-
-def _check_extent(species: str, plume: dict) -> None:
+def _check(species: str, plume: dict) -> None:
+    """Raise `ValueError` naming a quantity that is out of its range, unless it is traced."""
     plume = _read(plume)
-    _check(species, "top", "above base", plume["top"] > plume["base"])
-    _check(species, "aod_550", "0 or more", plume["aod_550"] >= 0)
-    _check(species, "brightness", "0 or more", plume["brightness"] >= 0)
+    for name, values in plume.items():
+        by_band = values.items() if isinstance(values, dict) else [(None, values)]
+        for band, x in by_band:
+            label = name if band is None else f"{name}[{band!r}]"
+            _refuse(species, label, x, STATE[name].holds, STATE[name].words)
+    base = plume["base"]
+    if not isinstance(base, Tracer):
+        _refuse(species, "top", plume["top"], lambda top: top > base, "above base")
 
 
-def _check_optics(species: str, plume: dict) -> None:
-    plume = _read(plume)
-    for band, extinction in plume["relative_extinction"].items():
-        _check(species, f"relative_extinction[{band!r}]", "0 or more", extinction >= 0)
-    for band, ssa in plume["ssa"].items():
-        _check(species, f"ssa[{band!r}]", "between 0 and 1", (ssa >= 0) & (ssa <= 1))
-    for band, g in plume["asymmetry"].items():
-        _check(species, f"asymmetry[{band!r}]", "between -1 and 1, exclusive", abs(g) < 1)
+def _refuse(
+    species: str, label: str, x: Any, holds: Callable[[np.ndarray], np.ndarray], allowed: str
+) -> None:
+    """Raise `ValueError` with the first value that does not hold, of those that can be read."""
+    if isinstance(x, Tracer):
+        return
+    bad = ~np.asarray(holds(x))
+    if np.any(bad):
+        raise ValueError(f"{label} of {species} is {x[bad][0]}; it must be {allowed}.")

@@ -7,35 +7,23 @@ import numpy as np
 import xarray as xr
 
 from ..files import InputError
-from ..files.plausible import PLAUSIBLE
 from ..nomenclature import QUALITY_FLAGS
+from ..ranges import STATE, WEATHER, Range
 from .species import classes_of, species_of
 
-_INF = float("inf")
-_GROUND = PLAUSIBLE["surface_temperature"][:2]
-# What a whole column of air weighs. [kg m-2]
-_MOST_CONDENSATE = 1.0e4
-
-# Quantity of a plume: smallest and largest value, and how to say so.
-_PLUME_RANGES = {
-    "brightness": (0.0, 1.0, "0 to 1"),
-    "base": (0.0, _INF, "0 m or more"),
-    "top": (0.0, _INF, "0 m or more"),
-    "extinction_550": (0.0, _INF, "0 m-1 or more"),
-    "relative_extinction": (0.0, _INF, "0 or more"),
-    "ssa": (0.0, 1.0, "0 to 1"),
-    "asymmetry": (-1.0, 1.0, "-1 to 1"),
-}
-# The same of what a scenario may have.
-_OPTIONAL_RANGES = {
-    "temperature": (100.0, 500.0, "100 to 500 K"),
-    "surface_temperature": (*_GROUND, f"{_GROUND[0]:g} to {_GROUND[1]:g} K"),
-    "vapour": (0.0, _INF, "0 kg m-2 or more"),
-    "ozone": (0.0, _INF, "0 DU or more"),
-    "carbon_dioxide": (0.0, 1.0, "0 to 1"),
-    "methane": (0.0, 1.0, "0 to 1"),
-    "nitrous_oxide": (0.0, 1.0, "0 to 1"),
-}
+_OF_PLUMES = (
+    "brightness",
+    "base",
+    "top",
+    "extinction_550",
+    "relative_extinction",
+    "ssa",
+    "asymmetry",
+)
+_OF_GASES = "vapour", "ozone", "carbon_dioxide", "methane", "nitrous_oxide"
+# What a scenario may have.
+_OPTIONAL = {name: WEATHER[name] for name in ("temperature", "surface_temperature")}
+_OPTIONAL |= {name: STATE[name] for name in _OF_GASES}
 
 
 class Requirement(NamedTuple):
@@ -75,28 +63,24 @@ def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
     for name in ("solar_zenith_angle", "view_zenith_angle"):
         yield Requirement(name, "finite", np.isfinite(scenario[name].values))
     for name in ("latitude", "longitude"):
-        lowest, highest, _ = PLAUSIBLE[name]
-        holds = _between(scenario[name].values, lowest, highest)
-        yield Requirement(name, f"{lowest:g} to {highest:g} degrees", holds)
+        yield _inside(name, scenario[name].values, WEATHER[name])
     pressure, height = scenario["pressure"].values, scenario["height"].values
-    yield Requirement("pressure", "finite and 0 Pa or more", _between(pressure, 0, _INF))
+    yield _inside("pressure", pressure, STATE["pressure"])
     yield Requirement("pressure", "larger than in the level above", _rises(pressure))
-    yield Requirement("height", "finite", np.isfinite(height))
+    yield _inside("height", height, STATE["height"])
     yield Requirement("height", "smaller than in the level above", _rises(-height))
     for name in ("liquid", *classes_of(scenario)):
         mass, number = (scenario[f"{name}_{x}_path"].values for x in ("mass", "number"))
-        allowed = f"0 to {_MOST_CONDENSATE:g} kg m-2"
-        yield Requirement(f"{name}_mass_path", allowed, _between(mass, 0, _MOST_CONDENSATE))
-        yield Requirement(f"{name}_number_path", "0 m-2 or more", _between(number, 0, _INF))
+        yield _inside(f"{name}_mass_path", mass, WEATHER["mass_path"])
+        yield _inside(f"{name}_number_path", number, STATE["number_path"])
         with_mass = (number > 0) | (mass == 0)
         yield Requirement(f"{name}_number_path", "positive where there is mass", with_mass)
-    for name, (lowest, highest, allowed) in _OPTIONAL_RANGES.items():
+    for name, allowed in _OPTIONAL.items():
         if name in scenario:
-            values = scenario[name].values
-            yield Requirement(name, allowed, _between(values, lowest, highest))
-    albedo = scenario["surface_albedo"].values
+            yield _inside(name, scenario[name].values, allowed)
+    albedo = _inside("surface_albedo", scenario["surface_albedo"].values, STATE["albedo"])
     missing = (scenario["quality_flag"].values & QUALITY_FLAGS["no_albedo"]) > 0
-    yield Requirement("surface_albedo", "0 to 1", _between(albedo, 0, 1) | missing)
+    yield albedo._replace(holds=albedo.holds | missing)
     for species in species_of(scenario):
         yield from _plume_requirements(scenario, species, height[0] - height[-1])
 
@@ -104,18 +88,18 @@ def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
 def _plume_requirements(
     scenario: xr.Dataset, species: str, depth: np.ndarray
 ) -> Iterator[Requirement]:
-    for quantity, (lowest, highest, allowed) in _PLUME_RANGES.items():
+    for quantity in _OF_PLUMES:
         name = f"{species}_{quantity}"
-        yield Requirement(name, allowed, _between(scenario[name].values, lowest, highest))
+        yield _inside(name, scenario[name].values, STATE[quantity])
     top, base = scenario[f"{species}_top"].values, scenario[f"{species}_base"].values
     yield Requirement(f"{species}_top", "above the plume's base", np.asarray(top > base))
     allowed = f"within the column, which is {depth.min():.0f} m deep"
     yield Requirement(f"{species}_top", allowed, top <= depth)
 
 
-def _between(values: np.ndarray, lowest: float, highest: float) -> np.ndarray:
-    """Where finite values lie in a closed range."""
-    return np.asarray(np.isfinite(values) & (values >= lowest) & (values <= highest))
+def _inside(name: str, values: np.ndarray, allowed: Range) -> Requirement:
+    """That values are in a range."""
+    return Requirement(name, allowed.words, np.asarray(allowed.holds(values)))
 
 
 def _rises(values: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..files import InputError
+from ..ranges import SHARE
 from ..surface import EMISSIVITY_3900NM
 from .land import FROM_MODEL, emissivity_by_land_use
 from .snow_and_ice import sea_ice_cover, snow_cover
@@ -49,8 +50,8 @@ def check_emissivity(emissivity: Emissivity | None, model: xr.Dataset | None = N
                 f"{', '.join(EMISSIVITY_3900NM)}, {BY_LAND_USE!r} for that of each column's land "
                 f"use, or {FROM_MODEL!r} for the model's own."
             )
-    elif not 0 <= emissivity <= 1:
-        raise InputError(f"the emissivity is {emissivity:g}; it must be 0 to 1.")
+    elif not SHARE.holds(emissivity):
+        raise InputError(f"the emissivity is {emissivity:g}; it must be {SHARE.words}.")
 
 
 def thermal_albedo(model: xr.Dataset, emissivity: Emissivity) -> tuple[np.ndarray, str]:

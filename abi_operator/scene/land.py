@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..files import InputError
+from ..ranges import SHARE
 from ..surface import EMISSIVITY_3900NM, LAND_USE
 
 FROM_MODEL = "model"
@@ -35,8 +36,8 @@ def check_land_albedo(albedo: LandAlbedo | None, model: xr.Dataset | None = None
             f"no albedo of land is known by the name of {albedo!r}; name a number, or "
             f"{FROM_MODEL!r} for the model's own."
         )
-    elif albedo is not None and not 0 <= albedo <= 1:
-        raise InputError(f"the albedo of land is {albedo:g}; it must be 0 to 1.")
+    elif albedo is not None and not SHARE.holds(albedo):
+        raise InputError(f"the albedo of land is {albedo:g}; it must be {SHARE.words}.")
 
 
 def with_last_resort(

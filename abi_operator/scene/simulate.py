@@ -15,6 +15,7 @@ from ..files import InputError
 from ..files.netcdf import cf_attributes
 from ..machine.chunks import map_chunks
 from ..machine.listening import Listener, listening
+from ..machine.sizes import chunks_to_read
 from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import aerosol, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
 from ..planck import brightness_temperature
@@ -29,8 +30,6 @@ from .gases import check_gases, gases_attribute, gases_of
 # Pixels with one of these flags are not solved; those of a night shine in C07.
 _UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 _UNSOLVED = _UNSEEN | QUALITY_FLAGS["night"]
-# Columns whose optical depths are taken together, in chunks of one of these.
-_WIDTHS = 64, 1024
 
 
 def simulate(
@@ -56,7 +55,7 @@ def simulate(
     gases
         Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams
-        Streams of the solver; see `solver.toa_brf`.
+        Streams of the solver; see `solver.Settings`.
     listener
         Is told of columns as they are solved: all that can be in the bands without emission, then
         all that can be in each of the others.
@@ -177,7 +176,7 @@ def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str,
     leaves, structure = jax.tree.flatten(atmosphere)
     function = partial(_depths_of_chunk, structure=structure, bands=bands)
     own, batch = [True] * len(leaves), (len(atmosphere.pressure),)
-    found = map_chunks(function, (structure, bands), leaves, own, batch, _WIDTHS)
+    found = map_chunks(function, (structure, bands), leaves, own, batch, chunks_to_read())
     return jax.tree.map(np.asarray, found)
 
 

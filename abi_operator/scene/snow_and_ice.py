@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..files import InputError
+from ..ranges import SHARE
 from ..surface import SNOW_AND_ICE_ALBEDO, snow_and_ice_albedo
 
 IceAlbedo = float | str
@@ -84,8 +85,8 @@ def check_ice_albedo(albedo: IceAlbedo | None, whose: str) -> None:
                 f"no albedo of {whose} is known by the name of {albedo!r}; name a number, or one "
                 f"of {', '.join(SNOW_AND_ICE_ALBEDO)}."
             )
-    elif albedo is not None and not 0 <= albedo <= 1:
-        raise InputError(f"the albedo of {whose} is {albedo:g}; it must be 0 to 1.")
+    elif albedo is not None and not SHARE.holds(albedo):
+        raise InputError(f"the albedo of {whose} is {albedo:g}; it must be {SHARE.words}.")
 
 
 def with_snow_and_ice(

@@ -5,8 +5,8 @@ input. `toa_brf` gives reflectances, `toa_radiance` radiances with thermal emiss
 `toa_albedo` the share of sunlight sent back, and `surface_coupling` the reflectance as a closed
 form in the ground's albedo. The ground is an albedo or a `Surface` of your own. Callers whose phase
 functions are sharp pass them at the scattering angle (`cos_scattering_angle`), from closed forms or
-from tables (`interpolate_phase_function`, `mix_phase_functions`). It knows nothing of aerosols,
-instruments or files.
+from tables (`interpolate_phase_function`, `mix_phase_functions`). How exactly to solve is told to
+all of them by name (`Settings`). It knows nothing of aerosols, instruments or files.
 """
 
 from .albedo import SurfaceCoupling as SurfaceCoupling
@@ -24,5 +24,6 @@ from .phase_table import mix_moments as mix_moments
 from .phase_table import mix_phase_functions as mix_phase_functions
 from .phase_table import moments_of_table as moments_of_table
 from .phase_table import normalise_table as normalise_table
+from .settings import Settings as Settings
 from .toa_brf import toa_brf as toa_brf
 from .toa_radiance import toa_radiance as toa_radiance

@@ -1,16 +1,21 @@
 """Fluxes that the azimuthal mean knows: plane albedo, and the ground's part in a reflectance."""
 
+from typing import Unpack
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._keywords import with_keywords
 from .column import promoted
-from .door import prepare, solve
+from .door import solve
 from .method.surface import AnySurface
 from .program import GroundResponse, ground_response, plane_albedo
+from .settings import OfFluxes, OfViews, Settings
 
 
+@with_keywords(OfFluxes, Settings())
 def toa_albedo(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
@@ -18,11 +23,8 @@ def toa_albedo(
     albedo: Float[ArrayLike, "*batch"] | AnySurface,
     mu0: Float[ArrayLike, "*batch"],
     *,
-    num_streams: int = 16,
-    delta_m: bool = True,
     secant: Float[ArrayLike, "*batch layer"] | None = None,
-    num_doublings: int | None = None,
-    check_values: bool | None = None,
+    **settings: Unpack[OfFluxes],
 ) -> Float[Array, "*batch"]:
     r"""Plane albedo at the top: upward flux over :math:`\mu_0 F_0`. [-]
 
@@ -39,17 +41,9 @@ def toa_albedo(
         relative_azimuth=no_view,
         secant=secant,
     )
-    options = prepare(
-        column,
-        num_streams=num_streams,
-        num_modes=1,
-        delta_m=delta_m,
-        single_scattering=None,
-        multiple_views=True,
-        num_doublings=num_doublings,
-        check_values=check_values,
-    )
-    return solve(plane_albedo, column, options, True, by_view=False, check_values=check_values)
+    how = Settings(**settings)
+    how = how._replace(num_modes=1, single_scattering=None, multiple_views=True)
+    return solve(plane_albedo, column, how, by_view=False)
 
 
 class SurfaceCoupling(eqx.Module):
@@ -93,6 +87,7 @@ class SurfaceCoupling(eqx.Module):
         return excess / (self.coupling + spherical * excess)
 
 
+@with_keywords(OfViews, Settings())
 def surface_coupling(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
@@ -101,15 +96,9 @@ def surface_coupling(
     mu: Float[ArrayLike, "*batch"],
     relative_azimuth: Float[ArrayLike, "*batch"],
     *,
-    num_streams: int = 16,
-    num_modes: int | None = None,
-    delta_m: bool = True,
-    single_scattering: str | None = "tms",
     phase_function: Float[ArrayLike, "*batch layer"] | None = None,
     secant: Float[ArrayLike, "*batch layer"] | None = None,
-    multiple_views: bool = False,
-    num_doublings: int | None = None,
-    check_values: bool | None = None,
+    **settings: Unpack[OfViews],
 ) -> SurfaceCoupling:
     """How a Lambertian ground of any albedo shows through these columns, in one solve.
 
@@ -132,19 +121,7 @@ def surface_coupling(
         phase_function=phase_function,
         secant=secant,
     )
-    options = prepare(
-        column,
-        num_streams=num_streams,
-        num_modes=num_modes,
-        delta_m=delta_m,
-        single_scattering=single_scattering,
-        multiple_views=multiple_views,
-        num_doublings=num_doublings,
-        check_values=check_values,
-    )
+    how = Settings(**settings)
     by_view = GroundResponse._make([True, True, False])  # the spherical albedo has no view
-    found = solve(
-        ground_response, column, options, multiple_views, by_view=by_view, check_values=check_values
-    )
-    black, coupling, spherical = found
-    return SurfaceCoupling(black, coupling, spherical, multiple_views)
+    black, coupling, spherical = solve(ground_response, column, how, by_view=by_view)
+    return SurfaceCoupling(black, coupling, spherical, how.multiple_views)

@@ -13,29 +13,7 @@ import jax
 import numpy as np
 from jax.core import Tracer
 
-_FINITE = (-np.inf, np.inf, "()")
-_NOT_NEGATIVE = (0.0, np.inf, "[)")
-_UNIT_INTERVAL = (0.0, 1.0, "[]")
-_COSINE = (0.0, 1.0, "(]")
-# Radians: a difference of two azimuths is 2 pi at most, and what is more is degrees.
-_AZIMUTH = (-6.2832, 6.2832, "[]")
-
-# Lowest and highest value, and which of the two belong to the range.
-RANGES = {
-    "tau": _NOT_NEGATIVE,
-    "ssa": _UNIT_INTERVAL,
-    "moments": (-1.0, 1.0, "[]"),
-    "albedo": _UNIT_INTERVAL,
-    "mu0": _COSINE,
-    "mu": _COSINE,
-    "relative_azimuth": _AZIMUTH,
-    "phase_function": _NOT_NEGATIVE,
-    "secant": (0.0, np.inf, "()"),
-    "solar_irradiance": _NOT_NEGATIVE,
-    "planck_levels": _NOT_NEGATIVE,
-    "surface_emission": _NOT_NEGATIVE,
-    "isotropic_top": _NOT_NEGATIVE,
-}
+from ..ranges import FINITE, SOLVER, Range
 
 # Largest last term (2l + 1) |chi_l| of a series from which a phase function is summed.
 LAST_TERM = 1e-3
@@ -44,18 +22,14 @@ LAST_TERM = 1e-3
 def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
     r"""Refuse values that are not finite or lie outside their physical range.
 
-    tau, phase_function, solar_irradiance, planck_levels, surface_emission and isotropic_top must be
-    0 or more, secant above 0, ssa and a Lambertian albedo in [0, 1], moments in [-1, 1], mu0 and mu
-    in (0, 1], relative_azimuth in [-2 pi, 2 pi]; all must be finite. Exceptions: chi_0, which the
-    solver does not read, need only be finite, and so need mu0 where solar_irradiance is 0. Each
-    number is judged in its own precision: one step above 1 is outside [0, 1].
+    The ranges are those of `ranges.SOLVER`. Exceptions: chi_0, which the solver does not read, need
+    only be finite, and so need mu0 where solar_irradiance is 0, and all arrays of a surface.
 
     Parameters
     ----------
     arguments
         Arguments of the solver by name, with shapes that broadcast as the solver has them; None
-        for one that is not given. `albedo` is an array or a surface, of which every array must be
-        finite.
+        for one that is not given. `albedo` is an array or a surface.
     series_summed
         Whether phase functions are summed from the moments given. Then the last of them must have
         :math:`(2l+1)|\chi_l| \le` 1e-3 in every layer that scatters.
@@ -79,19 +53,19 @@ def check_arguments(arguments: dict[str, Any], *, series_summed: bool) -> None:
     for name, value in arguments.items():
         if name == "albedo" and surface:
             for label, leaf in _leaves(name, value):
-                _check_range(label, np.asarray(leaf), _FINITE)
+                _check_range(label, np.asarray(leaf), FINITE)
         elif name == "moments":
             moments = np.asarray(value)
-            _check_range(name, moments, _FINITE)
+            _check_range(name, moments, FINITE)
             read = np.arange(moments.shape[-1]) > 0
-            _check_range(name, moments, RANGES[name], judged=read)
+            _check_range(name, moments, SOLVER[name], judged=read)
         elif name == "mu0" and "solar_irradiance" in arguments:
             mu0 = np.asarray(value)
-            _check_range(name, mu0, _FINITE)
+            _check_range(name, mu0, FINITE)
             lit = _reduced(np.not_equal(arguments["solar_irradiance"], 0), mu0.shape)
-            _check_range(name, mu0, RANGES[name], judged=lit)
+            _check_range(name, mu0, SOLVER[name], judged=lit)
         else:
-            _check_range(name, np.asarray(value), RANGES[name])
+            _check_range(name, np.asarray(value), SOLVER[name])
     if series_summed:
         _check_series(*(np.asarray(arguments[name]) for name in ("tau", "ssa", "moments")))
 
@@ -130,10 +104,7 @@ def _surely_inside(name: str, value: Any) -> bool:
     if limits is not None and x.flags.c_contiguous:
         integers, largest = limits
         return bool(x.view(integers).max() <= largest)
-    low, high, ends = RANGES[name]
-    smallest, largest = x.min(), x.max()
-    above = smallest >= low if ends[0] == "[" else smallest > low
-    return bool(above and (largest <= high if ends[1] == "]" else largest < high))
+    return bool(SOLVER[name].holds(x.min()) and SOLVER[name].holds(x.max()))
 
 
 @cache
@@ -142,13 +113,13 @@ def _bits(name: str, dtype: np.dtype) -> tuple[Any, Any] | None:
 
     None for ranges that begin elsewhere. That of moments does, but most are not negative.
     """
-    low, high, ends = RANGES[name]
+    allowed = SOLVER[name]
     integers = {4: np.uint32, 8: np.uint64}.get(dtype.itemsize)
-    from_zero = (low == 0 and ends[0] == "[") or name == "moments"
+    from_zero = (allowed.low == 0 and allowed.ends[0] == "[") or name == "moments"
     if integers is None or dtype.kind != "f" or not from_zero:
         return None
-    end = np.asarray(high, dtype)
-    largest = end if ends[1] == "]" else np.nextafter(end, np.zeros_like(end))
+    end = np.asarray(allowed.high, dtype)
+    largest = end if allowed.ends[1] == "]" else np.nextafter(end, np.zeros_like(end))
     return integers, largest.view(integers)[()]
 
 
@@ -171,19 +142,14 @@ def _leaves(name: str, value: Any) -> list[tuple[str, Any]]:
 def _check_range(
     name: str,
     x: np.ndarray,
-    allowed: tuple[float, float, str],
+    allowed: Range,
     judged: np.ndarray | bool = True,
 ) -> None:
-    low, high, ends = allowed
-    above = x >= low if ends[0] == "[" else x > low
-    below = x <= high if ends[1] == "]" else x < high
-    bad = np.asarray(~(above & below) & judged)
+    bad = np.asarray(~allowed.holds(x) & judged)
     if np.any(bad):
         index, others = _first(bad)
-        interval = f"{ends[0]}{low:g}, {high:g}{ends[1]}"
-        unit = " rad" if name == "relative_azimuth" else ""
         label = f"{name}{_subscript(index)} = {x[index]!s}"
-        raise ValueError(f"{label} is outside {interval}{unit}{others}.")
+        raise ValueError(f"{label} is outside {allowed.interval}{others}.")
 
 
 def _check_series(tau: np.ndarray, ssa: np.ndarray, moments: np.ndarray) -> None:

@@ -51,7 +51,7 @@ OWN_AXES = {
 
 
 class Options(NamedTuple):
-    """What is static in a program of the solver; see `toa_brf`.
+    """What is static in a program of the solver; see `Settings`.
 
     Without a number of doublings every layer of a value has its own (`doublings`). Where the number
     is for layers that nobody has read (`unread`), columns with one that it does not suffice for are
@@ -235,23 +235,3 @@ def aligned(column: Column, multiple_views: bool) -> tuple[Column, tuple[int, ..
         for name, value in column._asdict().items()
     }
     return Column(**fields), batch
-
-
-def check_options(
-    num_streams: int,
-    num_modes: int | None,
-    single_scattering: str | None,
-    num_doublings: int | None,
-    error_budget: float | None = None,
-) -> None:
-    """Refuse options out of range."""
-    if num_streams < 2 or num_streams % 2:
-        raise ValueError(f"num_streams must be even and at least 2; got {num_streams}.")
-    if num_modes is not None and not 1 <= num_modes <= num_streams:
-        raise ValueError(f"num_modes must be 1 to num_streams = {num_streams}; got {num_modes}.")
-    if single_scattering not in ("tms", None):
-        raise ValueError(f"single_scattering must be 'tms' or None; got {single_scattering!r}.")
-    if num_doublings is not None and num_doublings < 0:
-        raise ValueError(f"num_doublings must be 0 or more; got {num_doublings}.")
-    if error_budget is not None and not 0 < error_budget < 1:
-        raise ValueError(f"error_budget must be above 0 and below 1, or None; got {error_budget}.")

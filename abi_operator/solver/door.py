@@ -7,15 +7,14 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from ..machine.batching import tile_size
 from ..machine.door import Leaves, enter
 from ..machine.independent_columns import independent_columns
+from ..machine.sizes import chunks_of_columns, tile_size
 from ..machine.slopes import slopes_by_reverse_mode
 from .checks import check_arguments, check_in_memory
 from .column import (
     Column,
     Options,
-    check_options,
     check_shapes,
     choose_doublings,
     names,
@@ -23,50 +22,17 @@ from .column import (
     solved,
 )
 from .method.doublings import unknown_doublings
-
-
-def prepare(
-    column: Column,
-    *,
-    num_streams: int,
-    num_modes: int | None,
-    delta_m: bool,
-    single_scattering: str | None,
-    multiple_views: bool,
-    num_doublings: int | None,
-    check_values: bool | None,
-    checked: Column | None = None,
-    error_budget: float | None = None,
-) -> Options:
-    """What every door does with its promoted arguments before the program: check and choose.
-
-    Values are checked here where they must be, in `checked` if the column to solve is not what the
-    caller gave; where they may be that is left to `solve`.
-    """
-    check_options(num_streams, num_modes, single_scattering, num_doublings, error_budget)
-    check_shapes(column, num_streams + 1 if delta_m else num_streams, multiple_views)
-    if check_values:
-        given = (column if checked is None else checked)._asdict()
-        summed = single_scattering == "tms" and column.phase_function is None
-        check_arguments({k: x for k, x in given.items() if x is not None}, series_summed=summed)
-    return Options(
-        num_streams,
-        num_streams if num_modes is None else num_modes,
-        delta_m,
-        single_scattering == "tms",
-        num_doublings,
-        error_budget=None if error_budget is None else float(error_budget),
-    )
+from .settings import Settings, check_settings
 
 
 def solve(
     tile: Callable[[Column, Options], Any],
     column: Column,
-    options: Options,
-    multiple_views: bool,
+    settings: Settings,
+    *,
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None = None,
     by_view: Any = True,
-    check_values: bool | None = None,
+    given: Column | None = None,
 ) -> Any:
     """Solve columns, with derivatives, `jax.vmap` and threads as they are cheapest.
 
@@ -74,19 +40,42 @@ def solve(
     ----------
     tile
         Maps columns whose batch is last (`column.aligned`) to a pytree of arrays ``*view batch``.
-    column, options, multiple_views
-        What to solve.
+    column
+        What to solve: promoted arguments.
+    settings
+        How to solve it.
     gradient
         As in `independent_columns`, of `tile`.
     by_view
         Which results of `tile` have an axis of views: a pytree of bools of the same structure.
-    check_values
-        None to check values where there are any, under derivatives and `jax.vmap` too.
+    given
+        What the caller gave, where that is not the column to solve: its values are checked.
     """
+    options = _options(column, settings)
+    if settings.check_values:
+        arguments = {k: x for k, x in (given or column)._asdict().items() if x is not None}
+        check_arguments(arguments, series_summed=options.tms and "phase_function" not in arguments)
     leaves, structure = jax.tree.flatten(column)
-    checked = check_values is not None
-    program = _Program(tile, gradient, options, multiple_views, structure, by_view, checked)
+    # Those of None are checked by the program, which knows what can be read under derivatives too.
+    checked = settings.check_values is not None
+    several = settings.multiple_views
+    program = _Program(tile, gradient, options, several, structure, by_view, checked)
     return enter(program, leaves)
+
+
+def _options(column: Column, settings: Settings) -> Options:
+    """What of the settings is static in the program, refused where it is out of range."""
+    check_settings(settings)
+    num_streams, delta_m = settings.num_streams, settings.delta_m
+    check_shapes(column, num_streams + 1 if delta_m else num_streams, settings.multiple_views)
+    return Options(
+        num_streams,
+        num_streams if settings.num_modes is None else settings.num_modes,
+        delta_m,
+        settings.single_scattering == "tms",
+        settings.num_doublings,
+        error_budget=settings.error_budget,
+    )
 
 
 class _Program(NamedTuple):
@@ -131,10 +120,7 @@ class _Program(NamedTuple):
         )
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        tile = tile_size(self.options.num_streams, leaves[0].dtype)
-        # At few streams a chunk is solved in few times what it needs to begin and to end.
-        brief = self.options.num_streams <= 8
-        return (8, tile, 8 * tile, 16 * tile) if brief else (8, tile, 8 * tile)
+        return chunks_of_columns(self.options.num_streams, leaves[0].dtype)
 
     def value(self, leaves: Leaves) -> Any:
         column = jax.tree.unflatten(self.structure, leaves)

@@ -1,15 +1,20 @@
 """The solver's door for reflectances: plane-parallel columns seen from the top."""
 
+from typing import Unpack
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from .._keywords import with_keywords
 from .column import Column, Options, promoted
-from .door import prepare, solve
+from .door import solve
 from .method.surface import AnySurface
 from .program import emerging
+from .settings import OfReflectances, Settings
 
 
+@with_keywords(OfReflectances, Settings())
 def toa_brf(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
@@ -19,16 +24,9 @@ def toa_brf(
     mu: Float[ArrayLike, "*batch"],
     relative_azimuth: Float[ArrayLike, "*batch"],
     *,
-    num_streams: int = 16,
-    num_modes: int | None = None,
-    delta_m: bool = True,
-    single_scattering: str | None = "tms",
     phase_function: Float[ArrayLike, "*batch layer"] | None = None,
     secant: Float[ArrayLike, "*batch layer"] | None = None,
-    multiple_views: bool = False,
-    num_doublings: int | None = None,
-    error_budget: float | None = None,
-    check_values: bool | None = None,
+    **settings: Unpack[OfReflectances],
 ) -> Float[Array, "*batch"]:
     r"""Bidirectional reflectance factor :math:`\pi I/(\mu_0 F_0)` at the top of the atmosphere.
 
@@ -52,15 +50,6 @@ def toa_brf(
         to 1e-6 from 1e-3 rad on). [-]
     relative_azimuth
         Azimuth between satellite and sun: 0 on the same side (backscatter), pi in the glint. [rad]
-    num_streams
-        Streams in both hemispheres together, even.
-    num_modes
-        Azimuth modes of the multiple scattering; None for all `num_streams` of them. The exact
-        single scattering is untouched by it.
-    delta_m
-        Whether to scale forward peaks away.
-    single_scattering
-        ``"tms"`` replaces light scattered once by its exact value; None leaves it to the streams.
     phase_function
         Exact phase function of each layer at the scattering angle (`cos_scattering_angle`), mean 1
         over the sphere, from a closed form or a table (`interpolate_phase_function`); None sums
@@ -68,25 +57,8 @@ def toa_brf(
     secant
         Replaces 1 / mu0 in the attenuation of the sun's beam, layer by layer, for a sun low over a
         spherical Earth (`slant_path_secant`). [-]
-    multiple_views
-        Whether `mu`, `relative_azimuth` and `phase_function` have one more axis, the last, over
-        views of the same columns; the result keeps it. Many views cost little more than one.
-    num_doublings
-        Doublings of a layer at most (see `layer.half_layer`): each has as many as it needs up to
-        that, and too small a number is an error that nothing reports. None sets no limit; in
-        programs for slopes it is what the largest layer needs where the arguments are concrete,
-        and where they are traced what one of 1e5 needs under a sun at a cosine of 1e-3: columns
-        with a layer that needs more are NaN there, values and slopes.
-    error_budget
-        Relative error of the reflectance (of 0.01 where it is less, in 99 of 100 columns) that may
-        be made on top of what the streams leave: layers that are alike are solved as one, azimuth
-        modes and doublings end where the rest is less (`skipping`). 1e-3 is a good one. None solves
-        everything.
-    check_values
-        Whether to refuse values out of range; see `checks`. None checks what lies in memory, which
-        takes a hundredth of the time that solving does: not what is traced inside `jax.jit`, nor
-        what lies on another device. True insists, which needs concrete arguments, and refuses
-        series of moments too that end too early to sum a phase function from. False checks nothing.
+    **settings
+        How exactly to solve: the fields of `Settings`.
 
     Returns
     -------
@@ -95,7 +67,7 @@ def toa_brf(
     Raises
     ------
     ValueError
-        If shapes do not match, there are too few moments, or an option or a value is out of range.
+        If shapes do not match, there are too few moments, or a setting or a value is out of range.
     """
     column = promoted(
         tau=tau,
@@ -108,19 +80,8 @@ def toa_brf(
         phase_function=phase_function,
         secant=secant,
     )
-    options = prepare(
-        column,
-        num_streams=num_streams,
-        num_modes=num_modes,
-        delta_m=delta_m,
-        single_scattering=single_scattering,
-        multiple_views=multiple_views,
-        num_doublings=num_doublings,
-        error_budget=error_budget,
-        check_values=check_values,
-    )
-    gradient = _view_by_view if multiple_views else None
-    return solve(_brf, column, options, multiple_views, gradient, check_values=check_values)
+    how = Settings(**settings)
+    return solve(_brf, column, how, gradient=_view_by_view if how.multiple_views else None)
 
 
 def _brf(tile: Column, options: Options) -> Array:

@@ -1,18 +1,23 @@
 """The solver's door for radiances: sunlight, thermal emission, or both in one solve."""
 
+from typing import Unpack
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from .._keywords import with_keywords
 from .column import Column, Options, promoted
-from .door import prepare, solve
+from .door import solve
 from .method.surface import AnySurface
 from .program import emerging
+from .settings import OfViews, Settings
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
 _LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5
 
 
+@with_keywords(OfViews, Settings())
 def toa_radiance(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
@@ -26,15 +31,9 @@ def toa_radiance(
     planck_levels: Float[ArrayLike, "*batch level"] | None = None,
     surface_emission: Float[ArrayLike, "*batch"] | None = None,
     isotropic_top: Float[ArrayLike, "*batch"] | float = 0.0,
-    num_streams: int = 16,
-    num_modes: int | None = None,
-    delta_m: bool = True,
-    single_scattering: str | None = "tms",
     phase_function: Float[ArrayLike, "*batch layer"] | None = None,
     secant: Float[ArrayLike, "*batch layer"] | None = None,
-    multiple_views: bool = False,
-    num_doublings: int | None = None,
-    check_values: bool | None = None,
+    **settings: Unpack[OfViews],
 ) -> Float[Array, "*batch"]:
     r"""Radiance at the top of the atmosphere, in the units of its sources.
 
@@ -55,8 +54,7 @@ def toa_radiance(
         None for 0. [radiance unit]
     isotropic_top
         Radiance that falls on the top from all directions alike. [radiance unit]
-    num_streams, num_modes, delta_m, single_scattering, phase_function, secant, multiple_views, \
-num_doublings, check_values
+    phase_function, secant, **settings
         As in `toa_brf`.
 
     Returns
@@ -85,19 +83,7 @@ num_doublings, check_values
         isotropic_top=None if dark else isotropic_top,
         solar_irradiance=solar_irradiance,
     )
-    column = _with_harmless_sun(given)
-    options = prepare(
-        column,
-        checked=given,
-        num_streams=num_streams,
-        num_modes=num_modes,
-        delta_m=delta_m,
-        single_scattering=single_scattering,
-        multiple_views=multiple_views,
-        num_doublings=num_doublings,
-        check_values=check_values,
-    )
-    return solve(_radiance, column, options, multiple_views, check_values=check_values)
+    return solve(_radiance, _with_harmless_sun(given), Settings(**settings), given=given)
 
 
 def _with_harmless_sun(column: Column) -> Column:

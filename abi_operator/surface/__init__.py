@@ -8,13 +8,13 @@ thermal light of a ground of which a part may burn, and `reported` says where ke
 describe no ground at all.
 """
 
+from ..lambertian import Lambertian as Lambertian
 from .emission import EMISSIVITY_3900NM as EMISSIVITY_3900NM
 from .emission import emissivity_3900nm as emissivity_3900nm
 from .emission import surface_emission as surface_emission
 from .energy import Report as Report
 from .energy import directional_albedo as directional_albedo
 from .energy import reported as reported
-from .lambertian import Lambertian as Lambertian
 from .land_use import LAND_USE as LAND_USE
 from .modis_to_abi import MODIS_TO_ABI as MODIS_TO_ABI
 from .modis_to_abi import modis_to_abi as modis_to_abi

@@ -9,6 +9,7 @@ from programs import programs_anew
 from states import column
 
 from abi_operator import bands_of_states, brf
+from abi_operator.machine import sizes
 
 BANDS = ("C01",)
 OPTIONS = {"num_streams": 2, "num_modes": 1}
@@ -50,7 +51,7 @@ def test_tiles_do_not_show(monkeypatch):
         return map_tiles(function, leaves, width)
 
     monkeypatch.setattr(bands_of_states, "map_tiles", watched)
-    monkeypatch.setattr(bands_of_states, "tile_size", lambda *_: 1)
+    monkeypatch.setattr(sizes, "tile_size", lambda *_: 1)
     for solve, expected in ((jax.jit(lambda s: solved(s)), (20, 8)), (solved, (8, 8))):
         programs_anew(monkeypatch)
         tiles.clear()

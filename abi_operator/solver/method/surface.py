@@ -1,4 +1,4 @@
-"""What the solver asks of a ground, and the plainest one."""
+"""What the solver asks of a ground, and the plainest one, which it shares with other rooms."""
 
 import abc
 from typing import Any, Protocol, runtime_checkable
@@ -7,6 +7,8 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
+
+from ...lambertian import Lambertian as Lambertian
 
 
 @runtime_checkable
@@ -74,23 +76,3 @@ class Surface(eqx.Module):
         values = self.brdf(mu_out[None], mu_in[None], nodes)
         order = jnp.asarray(m).astype(mu_out.dtype)
         return jnp.tensordot(jnp.cos(order * nodes.ravel()) / count, values, axes=1)
-
-
-class Lambertian(Surface):
-    """A ground that reflects the same radiance in all directions.
-
-    Parameters
-    ----------
-    albedo
-        Share of the incident light that is reflected. [-]
-    """
-
-    albedo: Float[Array, "*batch"]
-
-    def brdf(self, mu_out, mu_in, relative_azimuth):
-        shape = jnp.broadcast_shapes(mu_out.shape, mu_in.shape, relative_azimuth.shape)
-        return jnp.broadcast_to(self.albedo, shape)
-
-    def modes(self, m, mu_out, mu_in):
-        shape = jnp.broadcast_shapes(mu_out.shape, mu_in.shape)
-        return jnp.broadcast_to(jnp.where(jnp.asarray(m) == 0, self.albedo, 0), shape)

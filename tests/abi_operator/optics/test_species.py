@@ -89,14 +89,15 @@ def test_an_array_of_brightness_makes_a_batch():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (dict(base=2000.0, top=2000.0), "top of .* must be above base"),
-        (dict(ssa={"C02": 1.01}), r"ssa\['C02'\] of .* between 0 and 1"),
-        (dict(ssa={"C02": -0.1}), r"ssa\['C02'\] of .* between 0 and 1"),
-        (dict(asymmetry={"C06": -1.0}), r"asymmetry\['C06'\] of .* between -1 and 1"),
+        (dict(base=2000.0, top=2000.0), "top of .* is 2000.0; it must be above base"),
+        (dict(ssa={"C02": 1.01}), r"ssa\['C02'\] of .* is 1.01; it must be 0 to 1"),
+        (dict(ssa={"C02": -0.1}), r"ssa\['C02'\] of .* is -0.1; it must be 0 to 1"),
+        (dict(asymmetry={"C06": -1.0}), r"asymmetry\['C06'\] of .* above -1 and below 1"),
         (dict(asymmetry={"C06": float("nan")}), r"asymmetry\['C06'\] of"),
         (dict(relative_extinction={"C01": -1.0}), r"relative_extinction\['C01'\] of"),
-        (dict(aod_550=-0.1), "aod_550 of .* must be 0 or more"),
-        (dict(brightness=np.array([0.5, -0.5])), "brightness of .* must be 0 or more"),
+        (dict(base=-1.0), "base of .* is -1.0; it must be 0 m or more"),
+        (dict(aod_550=-0.1), "aod_550 of .* is -0.1; it must be 0 or more"),
+        (dict(brightness=np.array([0.5, -0.5])), "brightness of .* is -0.5; it must be 0 to 1"),
         (dict(bands=("C01",), ssa={"C02": 0.9}), r"ssa of .* is given in \['C02'\]"),
         (dict(bands=("C13",)), r"bands \['C13'\] are not simulated"),
     ],
@@ -135,11 +136,17 @@ def test_plume_of_spheres():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (dict(top=1000.0), "top of ash must be above base"),
-        (dict(aod_550=-0.1), "aod_550 of ash must be 0 or more"),
-        (dict(brightness=-0.5), "brightness of ash must be 0 or more"),
-        (dict(effective_radius_um=np.zeros(2)), "effective_radius_um of ash must be above 0"),
-        (dict(effective_radius_um=float("nan")), "effective_radius_um of ash must be above 0"),
+        (dict(top=1000.0), "top of ash is 1000.0; it must be above base"),
+        (dict(aod_550=-0.1), "aod_550 of ash is -0.1; it must be 0 or more"),
+        (dict(brightness=-0.5), "brightness of ash is -0.5; it must be 0 to 1"),
+        (
+            dict(effective_radius_um=np.zeros(2)),
+            "effective_radius_um of ash is .*; it must be above 0 um",
+        ),
+        (
+            dict(effective_radius_um=float("nan")),
+            "effective_radius_um of ash is .*; it must be above 0 um",
+        ),
     ],
 )
 def test_numbers_of_spheres_out_of_range_are_named(wrong, message):

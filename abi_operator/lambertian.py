@@ -1,4 +1,4 @@
-"""A ground that reflects the same radiance in all directions."""
+"""The plainest ground, for the solver and for all that has grounds."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -1,0 +1,87 @@
+"""How many columns are taken together: on a CPU as many as suit its cache, elsewhere 4,096.
+
+A tile is what a program solves at once, in a loop over tiles; a chunk is what a program is called
+with, so that it is compiled for a few sizes whatever comes. On a CPU the fewer, the more of a layer
+is in the cache next to the processor; the more, the less the start of a kernel counts
+(`benchmarks/layout.py` measures both). Another device has no cache to keep a tile in, but many
+units to fill: there the number bounds memory alone.
+
+These are functions, and asked as columns come: which devices there are is settled when JAX is first
+used, and not when this package is imported.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+VECTOR = 8
+"""Numbers in double precision that a vector unit holds at most; tiles narrower than a few of these
+leave it idle."""
+
+# What another device than a CPU takes, of whatever is taken together.
+_ELSEWHERE = 4096
+# Columns of the solver in a tile of states, in tiles of the solver: its own loop is inside.
+_SOLVER_TILES = 8
+
+
+def tile_size(num_streams: int, dtype: Any) -> int:
+    """Columns that the solver takes at once, at most.
+
+    Below 64 LLVM unrolls short loops over them number by number, without vectors
+    (`algebra.weighted_rows` has what was done about it). Where a layer is one kernel (`kernels`) a
+    tile is also small enough for that.
+    """
+    if not _on_cpu():
+        return _ELSEWHERE
+    single = jnp.dtype(dtype) == jnp.float32
+    if num_streams > 16:
+        return 64 if single else 32
+    return 128 if single and num_streams > 8 else 64
+
+
+def tile_of_states(columns: int, num_streams: int, dtype: Any) -> int:
+    """States of which each is so many columns of the solver that are solved at once, at most."""
+    tile = tile_size(num_streams, dtype)
+    return VECTOR * max(1, _SOLVER_TILES * tile // columns // VECTOR)
+
+
+def tile_of_grounds() -> int:
+    """Columns whose grounds are looked at at once, each from some 2000 views."""
+    return 64 if _on_cpu() else _ELSEWHERE
+
+
+def chunks_of_columns(num_streams: int, dtype: Any) -> tuple[int, ...]:
+    """Numbers of the solver's columns that are worth a program, rising."""
+    tile = tile_size(num_streams, dtype)
+    # At few streams a chunk is solved in few times what it needs to begin and to end.
+    return (8, tile, 8 * tile, 16 * tile) if num_streams <= 8 else (8, tile, 8 * tile)
+
+
+def chunks_of_states(tile: int) -> tuple[int, ...]:
+    """Numbers of states that are worth a program, rising, of those solved in tiles of so many."""
+    return 1, tile, 8 * tile
+
+
+def chunks_to_read() -> tuple[int, ...]:
+    """Numbers of columns whose optics alone are taken together, rising."""
+    return 64, 1024 if _on_cpu() else _ELSEWHERE
+
+
+def chunk_of_pixels() -> int:
+    """Pixels that are retrieved together.
+
+    On a CPU few: a minimisation lasts until the slowest of them is done, and the matrices of many
+    columns leave the cache. 196 pixels of three bands took 3.1, 3.5, 3.8 and 4.8 s on two cores in
+    chunks of 16, 32, 48 and 96.
+    """
+    return 16 if _on_cpu() else _ELSEWHERE
+
+
+def chunk_of_pixels_to_read() -> int:
+    """Pixels whose thickest layers are looked for together."""
+    return 256 if _on_cpu() else _ELSEWHERE
+
+
+def _on_cpu() -> bool:
+    return jax.default_backend() == "cpu"

@@ -1,0 +1,49 @@
+"""How the operator simulates: what each of its functions is told by name."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypedDict
+
+from .optics import ALL_GASES
+
+
+class Settings(NamedTuple):
+    """How to simulate; `brf` and its neighbours take the fields of this as keyword arguments.
+
+    Parameters
+    ----------
+    satellite
+        Whose solar irradiance and response. Optics are those of GOES-16 for all; GOES-19 is refused
+        in the band in which its gas absorption is another (C04).
+    gases
+        Which of the atmosphere's gases absorb; ``()`` leaves them all out.
+    num_streams, num_modes, num_doublings
+        Accuracy and cost of the solver; see `solver.Settings`. With `num_doublings` None every
+        layer is exact, but for derivatives inside `jax.jit` and loops, where optical depths cannot
+        be read: columns with a layer thicker than 1000 are NaN there.
+    """
+
+    satellite: str = "GOES-16"
+    gases: tuple[str, ...] = ALL_GASES
+    num_streams: int = 8
+    num_modes: int | None = None
+    num_doublings: int | None = None
+
+
+class ByName(TypedDict, total=False):
+    """The same as keyword arguments, gases in any sequence."""
+
+    satellite: str
+    gases: Sequence[str]
+    num_streams: int
+    num_modes: int | None
+    num_doublings: int | None
+
+
+def settings_of(given: ByName) -> Settings:
+    """Settings of keyword arguments, or `ValueError` where gases are not a sequence of names."""
+    gases = given.get("gases", ALL_GASES)
+    if isinstance(gases, str):
+        raise ValueError(
+            f"gases are a sequence of names, such as ({gases!r},); got the string {gases!r}."
+        )
+    return Settings(**{**given, "gases": tuple(gases)})

@@ -1,0 +1,43 @@
+"""How many columns are taken together: on this CPU, and where there is another device."""
+
+import jax
+import numpy as np
+import pytest
+
+from abi_operator.machine import sizes
+
+ASKED = {
+    "solver": lambda: sizes.tile_size(8, np.float64),
+    "grounds": sizes.tile_of_grounds,
+    "optics": lambda: sizes.chunks_to_read()[-1],
+    "pixels": sizes.chunk_of_pixels,
+    "pixels to read": sizes.chunk_of_pixels_to_read,
+}
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_another_device_takes_4096_and_a_cpu_fewer(name, monkeypatch):
+    monkeypatch.setattr(jax, "default_backend", lambda: "cpu")
+    assert ASKED[name]() <= 1024
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    assert ASKED[name]() == 4096
+
+
+@pytest.mark.parametrize("backend", ["cpu", "gpu"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("num_streams", [2, 4, 8, 16, 32])
+def test_chunks_are_whole_tiles_and_rise(num_streams, dtype, backend, monkeypatch):
+    monkeypatch.setattr(jax, "default_backend", lambda: backend)
+    tile = sizes.tile_size(num_streams, dtype)
+    states = sizes.tile_of_states(28, num_streams, dtype)
+    for size, chunks in (
+        (tile, sizes.chunks_of_columns(num_streams, dtype)),
+        (states, sizes.chunks_of_states(states)),
+    ):
+        assert size % sizes.VECTOR == 0
+        assert list(chunks) == sorted(set(chunks))
+        assert all(width % size == 0 for width in chunks[1:])
+
+
+def test_a_state_of_many_columns_is_tiled_by_a_vector_at_least():
+    assert sizes.tile_of_states(10**6, 8, np.float64) == sizes.VECTOR
