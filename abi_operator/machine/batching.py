@@ -30,7 +30,12 @@ from .sizes import VECTOR
 _FEWEST_A_DEVICE = 4 * VECTOR
 
 
-def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
+def map_tiles(
+    function: Callable[[Any], Any],
+    columns: Any,
+    tile: int,
+    need: Callable[[Any], Array] | None = None,
+) -> Any:
     """Apply a batch-last `function` to a pytree of arrays tile by tile, on every CPU device.
 
     Parameters
@@ -42,6 +47,9 @@ def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
         up with copies of the last column, whose results are dropped.
     tile
         Columns a tile, at most.
+    need
+        Maps columns to a number each, by which they are sorted before they are cut into tiles:
+        those in a tile are then alike. None leaves them as they come.
     """
     size = jax.tree.leaves(columns)[0].shape[-1]
     devices = _devices(size)
@@ -49,15 +57,19 @@ def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
     if count == 1:
         return function(columns)
 
+    order = None if need is None else jnp.argsort(need(columns))
+    place = None if order is None else _places(order)
+
     # Columns are cut into tiles while their axis is the first, as callers give them, and turned
     # one tile at a time, in the cache: XLA drops what turns all of them to and fro.
     def tiled(x: Array) -> Array:
         padding = [(0, count * width - size)] + [(0, 0)] * (x.ndim - 1)
-        first = jnp.pad(jnp.moveaxis(x, -1, 0), padding, mode="edge")
+        first = jnp.pad(_taken(jnp.moveaxis(x, -1, 0), order), padding, mode="edge")
         return first.reshape(count, width, *first.shape[1:])
 
     def joined(x: Array) -> Array:
-        return jnp.moveaxis(x.reshape(count * width, *x.shape[2:])[:size], 0, -1)
+        first = x.reshape(count * width, *x.shape[2:])[:size]
+        return jnp.moveaxis(_taken(first, place), 0, -1)
 
     def of_tile(columns: Any) -> Any:
         result = function(jax.tree.map(lambda x: jnp.moveaxis(x, 0, -1), columns))
@@ -70,6 +82,18 @@ def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
     if len(devices) > 1:
         mapped = _divided(mapped, devices, _SHARE)
     return jax.tree.map(joined, mapped(jax.tree.map(tiled, columns)))
+
+
+def _taken(x: Array, order: Array | None) -> Array:
+    """Columns in another order."""
+    if order is None:
+        return x
+    return x.at[order].get(mode="promise_in_bounds", unique_indices=True)
+
+
+def _places(order: Array) -> Array:
+    """Where each column is in an order."""
+    return jnp.zeros_like(order).at[order].set(jnp.arange(order.size), unique_indices=True)
 
 
 def on_every_device(function: Callable[[Any], Any], columns: Any, divided: Sequence[bool]) -> Any:

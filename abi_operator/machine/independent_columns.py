@@ -31,6 +31,7 @@ def independent_columns(
     program: Callable[[Any], Any],
     tile: int,
     gradient: Callable[[Any], tuple[Any, Any]] | None = None,
+    need: Callable[[Any], Any] | None = None,
 ) -> Callable[[Any], Any]:
     """Solve columns tile by tile, with derivatives and `jax.vmap` as they are cheapest.
 
@@ -47,6 +48,8 @@ def independent_columns(
         column's result: those of its first array in order, then those of its second, and so on.
         Second derivatives differentiate it again; slopes that nobody wants are not compiled.
         None is reverse mode through `program`.
+    need
+        Of columns, by which they are sorted (`batching.map_tiles`).
 
     Returns
     -------
@@ -55,6 +58,9 @@ def independent_columns(
 
     def solve(columns: Any) -> Any:
         leaves, structure = jax.tree.flatten(columns)
+        of_leaves = None
+        if need is not None:
+            of_leaves = lambda leaves: need(jax.tree.unflatten(structure, leaves))  # noqa: E731
 
         def value(leaves: Leaves) -> Any:
             return program(jax.tree.unflatten(structure, leaves))
@@ -65,11 +71,11 @@ def independent_columns(
             result, slopes = gradient(jax.tree.unflatten(structure, leaves))
             return result, chosen(structure.flatten_up_to(slopes), wanted)
 
-        solution = jax.custom_jvp(_joining(value, tile))
+        solution = jax.custom_jvp(_joining(value, tile, of_leaves))
 
         def rule(primals: tuple[Leaves], tangents: tuple[list[Any]]) -> tuple[Any, Any]:
             wanted = [_perturbs(tangent) for tangent in tangents[0]]
-            both = _linearised(lambda leaves: value_and_slopes(leaves, wanted), tile)
+            both = _linearised(lambda leaves: value_and_slopes(leaves, wanted), tile, of_leaves)
             result, slopes = both(primals[0])
             return result, _contracted(slopes, chosen(tangents[0], wanted), result)
 
@@ -128,26 +134,26 @@ def _reverse_mode(
     return result, jax.vmap(slopes_of)(rows)
 
 
-def _linearised(function: Callable[[Leaves], Any], tile: int) -> Callable[[Leaves], Any]:
+def _linearised(function: Callable[[Leaves], Any], tile: int, need: Any) -> Callable[[Leaves], Any]:
     """`_joining`, differentiable again: `jax.custom_batching.custom_vmap` alone has no transpose.
 
     Second derivatives are JAX's own of the program of a tile. Mapped, they have that axis first.
     """
-    joining = jax.custom_jvp(_joining(function, tile))
+    joining = jax.custom_jvp(_joining(function, tile, need))
 
     @joining.defjvp
     def _(primals, tangents):
-        return jax.jvp(lambda leaves: map_tiles(function, leaves, tile), primals, tangents)
+        return jax.jvp(lambda leaves: map_tiles(function, leaves, tile, need), primals, tangents)
 
     return joining
 
 
-def _joining(function: Callable[[Leaves], Any], tile: int) -> Callable[[Leaves], Any]:
+def _joining(function: Callable[[Leaves], Any], tile: int, need: Any) -> Callable[[Leaves], Any]:
     """`function` tile by tile, whose batch takes in the axes that `jax.vmap` maps over."""
 
     @custom_vmap
     def joining(leaves: Leaves) -> Any:
-        return map_tiles(function, leaves, tile)
+        return map_tiles(function, leaves, tile, need)
 
     @joining.def_vmap
     def _(axis_size: int, is_mapped: list[list[bool]], leaves: Leaves) -> tuple[Any, Any]:

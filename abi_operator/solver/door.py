@@ -22,6 +22,7 @@ from .column import (
     solved,
 )
 from .method.doublings import unknown_doublings
+from .program import need
 from .settings import Settings, check_settings
 
 
@@ -129,6 +130,7 @@ class _Program(NamedTuple):
             lambda tile: self.tile(tile, self.options),
             tile_size(self.options.num_streams, jnp.result_type(*leaves)),
             None if gradient is None else lambda tile: gradient(tile, self.options),
+            None if self.options.error_budget is None else lambda tile: need(tile, self.options),
         )
         return solved(column, self.multiple_views, solve)
 

@@ -31,8 +31,11 @@ from .method.single_scatter import (
     exact_single_scattering,
 )
 from .method.surface import AnySurface
+from .skipping import company
 from .skipping.budget import Expected, expected
 from .skipping.plan import LayersOfModes
+
+_SOME_ALBEDO = 0.1  # of a ground that is none, where a rough one will do
 
 
 class Emerging(NamedTuple):
@@ -71,6 +74,21 @@ def emerging(column: Column, options: Options) -> Emerging:
     emitted = top.emerging(emission, problem.one, from_above, at_top)[1:]
     brf = _seen_at_once(problem) + 0.5 * (top.reflection() + problem.higher(others))
     return Emerging(brf, emitted)
+
+
+def need(column: Column, options: Options) -> Float[Array, "*batch"]:
+    """How much of columns will be solved, for those that need alike to be solved together."""
+    assert options.error_budget is not None
+    moments = column.moments[:, 1]
+    tau, ssa = column.tau, column.ssa
+    if options.delta_m:
+        scaled = scale_delta_m(tau, ssa, column.moments, options.num_streams)
+        tau, ssa, moments = scaled.tau, scaled.ssa, scaled.moments[:, 1]
+    albedo = column.albedo
+    if isinstance(albedo, AnySurface):
+        albedo = jnp.full_like(column.mu0, _SOME_ALBEDO)
+    mu = jnp.min(column.mu, axis=0)
+    return company.need(tau, ssa, ssa * moments, albedo, column.mu0, mu, options.error_budget)
 
 
 def ground_response(column: Column, options: Options) -> GroundResponse:

@@ -231,7 +231,7 @@ def _reflectance_and_gradient(inputs, plan, how):
         own = None if inputs.grounds is None else found.ground
         value = value + weight * reflection
         # The mean is never the last by chance.
-        size = jnp.where(mode.order.mean > 0, jnp.inf, jnp.abs(reflection))
+        size = jnp.where(mode.order.mean > 0, jnp.full_like(value, jnp.inf), jnp.abs(reflection))
         row = reflection[None], (found.even_beams, found.odd_beams), own
         return (value, found.shared, of_mean, room), row, value, size
 

@@ -67,14 +67,30 @@ def grouped(
     thickest
         Optical depth on the way down and up that no group exceeds, but a layer alone. [-]
     """
-    tau, scattered, forward, secant, allowed = jax.lax.stop_gradient(
-        (tau, scattered, forward, secant, allowed)
-    )
-    slant = 2 * jnp.maximum(secant, LEAST_SECANT / 2)
-    labels = one_kernel(_labels, 1)(tau, scattered, forward, slant, allowed, tau[0] * 0 + thickest)
+    arguments = _without_slopes(tau, scattered, forward, secant, allowed, thickest)
+    labels = one_kernel(_labels, 1)(*arguments)
     axes = tuple(range(1, labels.ndim))
     first, last = jnp.min(labels, axis=axes), jnp.max(labels, axis=axes)
     return Groups(labels, first, last, last[-1] + 1)
+
+
+def group_labels(
+    tau: Float[Array, "layer *batch"],
+    scattered: Float[Array, "layer *batch"],
+    forward: Float[Array, "layer *batch"],
+    secant: Float[Array, "*batch"],
+    allowed: Float[Array, "*batch"],
+    thickest: float,
+) -> Float[Array, "layer *batch"]:
+    """Number of each layer's group, of any number of columns; arguments as in `grouped`."""
+    return _labels(*_without_slopes(tau, scattered, forward, secant, allowed, thickest))
+
+
+def _without_slopes(tau, scattered, forward, secant, allowed, thickest):
+    slant = 2 * jnp.maximum(secant, LEAST_SECANT / 2)
+    return jax.lax.stop_gradient(
+        (tau, scattered, forward, slant, allowed, jnp.full_like(slant, thickest))
+    )
 
 
 class _Group(NamedTuple):

@@ -126,11 +126,13 @@ def test_gradients_are_finite_at_every_hard_place():
         assert finite.all(), f"{name}: {[n for n, ok in zip(names, finite, strict=True) if not ok]}"
 
 
-def test_gradients_never_compute_in_float64():
+@pytest.mark.parametrize("error_budget", [None, 1e-3])
+def test_gradients_never_compute_in_float64(error_budget):
     columns = [jnp.asarray(x, jnp.float32) for x in simple_columns()]
 
     def total(*columns):
-        return jnp.sum(toa_brf(*columns, num_streams=4, num_doublings=5))
+        how = {"num_doublings": 5, "error_budget": error_budget}
+        return jnp.sum(toa_brf(*columns, num_streams=4, **how))
 
     derivative = jax.grad(total, argnums=tuple(range(7)))
     assert "f64" not in jax.jit(derivative).lower(*columns).as_text()
