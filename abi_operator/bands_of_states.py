@@ -205,13 +205,14 @@ def _solved_unread(groups: Sequence[BandColumns], options: Options) -> Float[Arr
 
 
 def _terms(columns: BandColumns, arguments: dict[str, Any], settings: Settings) -> Array:
-    door = toa_radiance if columns.emit else toa_brf
-    return door(
-        **arguments,
-        num_streams=settings.num_streams,
-        num_modes=settings.num_modes,
-        num_doublings=settings.num_doublings,
-    )
+    how: dict[str, Any] = {
+        "num_streams": settings.num_streams,
+        "num_modes": settings.num_modes,
+        "num_doublings": settings.num_doublings,
+    }
+    if columns.emit:
+        return toa_radiance(**arguments, **how)
+    return toa_brf(**arguments, **how, error_budget=settings.error_budget)
 
 
 def _without_depth_of_opaque(columns: BandColumns) -> Array:

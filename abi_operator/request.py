@@ -45,8 +45,8 @@ class Request(NamedTuple):
         Name; degrees, east positive, where it does not stand at its usual place.
     time
         Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
-    num_streams
-        Streams of the solver.
+    num_streams, error_budget
+        Streams of the solver, and the relative error that it may make for speed (None: none).
     variables
         What the result keeps, as `files.stored` takes it.
     rayleigh_correction
@@ -72,6 +72,7 @@ class Request(NamedTuple):
     satellite_longitude: float | None = None
     time: int | str | None = None
     num_streams: int = 8
+    error_budget: float | None = None
     land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None
     snow_albedo: IceAlbedo | None = None

@@ -20,6 +20,10 @@ class Settings(NamedTuple):
         Accuracy and cost of the solver; see `solver.Settings`. With `num_doublings` None every
         layer is exact, but for derivatives inside `jax.jit` and loops, where optical depths cannot
         be read: columns with a layer thicker than 1000 are NaN there.
+    error_budget
+        Relative error of the reflectance that may be made for speed on top of what the streams
+        leave, such as 1e-3; see `solver.Settings`. None solves everything, and bands that emit
+        always do.
     """
 
     satellite: str = "GOES-16"
@@ -27,6 +31,7 @@ class Settings(NamedTuple):
     num_streams: int = 8
     num_modes: int | None = None
     num_doublings: int | None = None
+    error_budget: float | None = None
 
 
 class ByName(TypedDict, total=False):
@@ -37,6 +42,7 @@ class ByName(TypedDict, total=False):
     num_streams: int
     num_modes: int | None
     num_doublings: int | None
+    error_budget: float | None
 
 
 def settings_of(given: ByName) -> Settings:

@@ -157,6 +157,13 @@ def simulate(
             "slower.",
         ),
     ] = 8,
+    error_budget: Annotated[
+        float | None,
+        typer.Option(
+            help="Relative error of the reflectance that may be made for speed, such as 0.001; "
+            "nothing is left out without it, nor in C07.",
+        ),
+    ] = None,
     variables: Annotated[
         str,
         typer.Option(
@@ -188,6 +195,8 @@ def simulate(
     """
     if num_streams % 2:
         raise typer.BadParameter(f"the number of streams is even; got {num_streams}.")
+    if error_budget is not None and not 0 < error_budget < 1:
+        raise typer.BadParameter(f"an error budget is above 0 and below 1; got {error_budget}.")
     try:
         names = check_bands(_names(bands, _IMAGER_BANDS))
     except ValueError as error:
@@ -215,6 +224,7 @@ def simulate(
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=num_streams,
+        error_budget=error_budget,
         variables=tuple(name.strip() for name in variables.split(",")),
         rayleigh_correction=rayleigh_correction,
         command=typed(context),

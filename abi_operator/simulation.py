@@ -218,6 +218,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
             scene.shape,
             write_block,
             num_streams=request.num_streams,
+            error_budget=request.error_budget,
             block_columns=_BLOCK_COLUMNS,
         )
         wrf = dict.fromkeys(scene.series.places[time][0].name for time in scene.chosen_times)

@@ -58,9 +58,12 @@ def independent_columns(
 
     def solve(columns: Any) -> Any:
         leaves, structure = jax.tree.flatten(columns)
-        of_leaves = None
-        if need is not None:
-            of_leaves = lambda leaves: need(jax.tree.unflatten(structure, leaves))  # noqa: E731
+
+        def of_leaves(leaves: Leaves) -> Any:
+            assert need is not None
+            return need(jax.tree.unflatten(structure, leaves))
+
+        sorted_by = None if need is None else of_leaves
 
         def value(leaves: Leaves) -> Any:
             return program(jax.tree.unflatten(structure, leaves))
@@ -71,11 +74,11 @@ def independent_columns(
             result, slopes = gradient(jax.tree.unflatten(structure, leaves))
             return result, chosen(structure.flatten_up_to(slopes), wanted)
 
-        solution = jax.custom_jvp(_joining(value, tile, of_leaves))
+        solution = jax.custom_jvp(_joining(value, tile, sorted_by))
 
         def rule(primals: tuple[Leaves], tangents: tuple[list[Any]]) -> tuple[Any, Any]:
             wanted = [_perturbs(tangent) for tangent in tangents[0]]
-            both = _linearised(lambda leaves: value_and_slopes(leaves, wanted), tile, of_leaves)
+            both = _linearised(lambda leaves: value_and_slopes(leaves, wanted), tile, sorted_by)
             result, slopes = both(primals[0])
             return result, _contracted(slopes, chosen(tangents[0], wanted), result)
 

@@ -35,6 +35,7 @@ def run(
     write_block: WriteBlock,
     *,
     num_streams: int = 8,
+    error_budget: float | None = None,
     block_columns: int = 16384,
     progress: bool = True,
 ) -> dict[str, Attribute]:
@@ -50,7 +51,7 @@ def run(
         Numbers of rows and columns of the scene. [-]
     write_block
         Takes the index of the time, the rows and the block's result.
-    num_streams
+    num_streams, error_budget
         As in `simulate`.
     block_columns
         Atmospheric columns in memory at a time. [-]
@@ -70,7 +71,9 @@ def run(
                 thermal = np.isin(block["band"].values, list(THERMAL))
                 programs = int(thermal.sum()) + bool((~thermal).any())
                 bar.begin(block.sizes["y"] * block.sizes["x"], programs)
-                result = simulate(block, num_streams=num_streams, listener=bar)
+                result = simulate(
+                    block, num_streams=num_streams, error_budget=error_budget, listener=bar
+                )
                 write_block(time_index, rows, result)
                 account = add_accounts([account, result.attrs])
                 bar.end()

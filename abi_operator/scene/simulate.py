@@ -38,6 +38,7 @@ def simulate(
     bands: Sequence[str] | None = None,
     gases: Sequence[str] | None = None,
     num_streams: int = 8,
+    error_budget: float | None = None,
     listener: Listener | None = None,
 ) -> xr.Dataset:
     r"""Simulate the radiances and reflectances of a scenario.
@@ -54,8 +55,8 @@ def simulate(
         Bands to simulate; None for those of the scenario.
     gases
         Gases that absorb; None for those of the scenario (`gases_of`).
-    num_streams
-        Streams of the solver; see `solver.Settings`.
+    num_streams, error_budget
+        Streams of the solver, and what it may leave out; see `solver.Settings`.
     listener
         Is told of columns as they are solved: all that can be in the bands without emission, then
         all that can be in each of the others.
@@ -86,7 +87,7 @@ def simulate(
         fields = _optical_depths(states.atmosphere, bands)
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
     flags = flags | _flags(states, fields["outside_fitted_range"])
-    options = {"gases": gases, "num_streams": num_streams}
+    options = {"gases": gases, "num_streams": num_streams, "error_budget": error_budget}
     with listening(listener):
         fields |= _reflectances(states, flags, bands, options)
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
@@ -110,7 +111,10 @@ def simulate(
         result[name] = ((*own_dims, *shape), array, cf_attributes(name))
     known = result["quality_flag"]
     result["quality_flag"] = known.dims, flags.reshape(known.shape), known.attrs
-    return result.assign_attrs(num_streams=num_streams, gases=gases_attribute(gases))
+    # Of NetCDF's attributes none is no number: nothing is left out.
+    left_out = {} if error_budget is None else {"error_budget": error_budget}
+    how = {"num_streams": num_streams, "gases": gases_attribute(gases)}
+    return result.assign_attrs(how | left_out)
 
 
 def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:

@@ -45,8 +45,8 @@ class Settings(NamedTuple):
     single_scattering: str | None = "tms"
     multiple_views: bool = False
     num_doublings: int | None = None
-    check_values: bool | None = None
     error_budget: float | None = None
+    check_values: bool | None = None
 
 
 class OfFluxes(TypedDict, total=False):

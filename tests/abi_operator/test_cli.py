@@ -241,7 +241,7 @@ def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
     with netCDF4.Dataset(later, "a") as file:
         file["Times"][0] = np.array(list("2007-10-23_20:00:00"), "S1")
     options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--gases", "none"]
-    options += ["--bands", "C01,C06", "--out", tmp_path / "out"]
+    options += ["--bands", "C01,C06", "--error-budget", 1e-3, "--out", tmp_path / "out"]
     for wrf in ([inputs.wrf, later], [inputs.wrf.with_name("wrfout_*")]):
         outcome = invoke("simulate", *wrf, *options)
         assert outcome.exit_code == 0, outcome.output
@@ -249,6 +249,7 @@ def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
             hours = np.array(["2007-10-23T18", "2007-10-23T20"], "datetime64[ns]")
             np.testing.assert_array_equal(result["time"], hours)
             assert result.attrs["wrf_file"] == f"{inputs.wrf.name}; {later.name}"
+            assert result.attrs["error_budget"] == 1e-3
             early, late = result["solar_zenith_angle"].mean(["y", "x"]).values
             assert late < early
     outcome = invoke("simulate", *wrf, *options, "--time", "2007-10-23T20:00")
@@ -387,6 +388,7 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
     ("options", "message"),
     [
         (["--num-streams", "7"], "the number of streams is even"),
+        (["--error-budget", "1"], "an error budget is above 0 and below 1"),
         (["--bands", "C01,C08"], "'C08'"),
         (["--satellite", "GOES-13"], "'GOES-13'"),
         (["--gases", "SO2"], "['SO2'] are not known"),

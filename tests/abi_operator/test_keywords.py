@@ -10,16 +10,16 @@ from abi_operator import brf, brightness_temperature, radiance, reflectance_fact
 from abi_operator._keywords import with_keywords
 from abi_operator.settings import ByName
 from abi_operator.solver import surface_coupling, toa_albedo, toa_brf, toa_radiance
-from abi_operator.solver.settings import OfFluxes, OfViews
+from abi_operator.solver.settings import OfFluxes, OfReflectances, OfViews
 
 OPERATOR = abi_operator.Settings, ByName
-VIEWS, FLUXES = (solver.Settings, OfViews), (solver.Settings, OfFluxes)
+ALL, VIEWS, FLUXES = ((solver.Settings, x) for x in (OfReflectances, OfViews, OfFluxes))
 DOORS = {
     brf: OPERATOR,
     reflectance_factor: OPERATOR,
     radiance: OPERATOR,
     brightness_temperature: OPERATOR,
-    toa_brf: VIEWS,
+    toa_brf: ALL,
     toa_radiance: VIEWS,
     surface_coupling: VIEWS,
     toa_albedo: FLUXES,
@@ -68,7 +68,7 @@ def test_doors_take_the_fields_of_their_settings(door):
         door(num_stream=4)
 
 
-@pytest.mark.parametrize(("settings", "by_name"), [OPERATOR, VIEWS])
+@pytest.mark.parametrize(("settings", "by_name"), [OPERATOR, ALL])
 def test_every_setting_is_described_and_can_be_given(settings, by_name):
     assert set(settings._fields) == set(get_type_hints(by_name))
     entries = inspect.getdoc(settings).partition("----------\n")[2]

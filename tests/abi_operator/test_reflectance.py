@@ -197,3 +197,18 @@ def test_errors_name_what_is_wrong():
 def test_public_names():
     assert abi_operator.__version__
     assert set(GRASSO2013) < set(BANDS)
+
+
+def test_an_error_budget_is_for_values_and_derivatives():
+    """Within it, and the Jacobian within 1 % of each leaf's largest entry."""
+    states = stacked([column(liquid=x) for x in (0.0, 0.01, 0.1)])
+
+    def total(state, error_budget):
+        return jnp.sum(brf(state, ("C01", "C03"), error_budget=error_budget, **OPTIONS))
+
+    both = jax.value_and_grad(total)
+    (exact, slopes), (found, near) = both(states, None), both(states, 1e-3)
+    np.testing.assert_allclose(found, exact, rtol=1e-3)
+    assert found != exact
+    for slope, right in zip(jax.tree.leaves(near), jax.tree.leaves(slopes), strict=True):
+        np.testing.assert_allclose(slope, right, rtol=0, atol=0.01 * np.abs(right).max() + 1e-12)

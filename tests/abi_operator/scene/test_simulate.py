@@ -67,6 +67,13 @@ def test_chunks_and_one_shot_agree(made):
     np.testing.assert_allclose(np.moveaxis(chunked, 0, -1).reshape(6, 2), direct, rtol=ROUNDING)
 
 
+def test_an_error_budget_is_kept_and_told(made):
+    exact, found = simulate(made, **OPTIONS), simulate(made, error_budget=1e-3, **OPTIONS)
+    assert found.attrs["error_budget"] == 1e-3 and "error_budget" not in exact.attrs
+    wrong = np.abs(found["brf"] - exact["brf"]) / np.maximum(exact["brf"], 0.01)
+    assert 0 < wrong.max() < 1e-3
+
+
 def test_bands_can_be_chosen(made):
     one = simulate(made, bands=("C03",), **OPTIONS)
     assert one["band"].values.tolist() == ["C03"]
