@@ -30,7 +30,7 @@ EXTENT = 100e3  # of the image [m]
 SHORTEST, LONGEST = 12e3, 100e3  # waves of the fields [m]
 TOP = 20.5e3  # of the model over the sea [m]
 STRETCHING = 4.0  # of 30 layers the lowest is 100 m thick and the highest 2.6 km
-MU0, MU = (0.2, 0.97), (0.3, 0.97)  # cosines of sun and view
+MU0, MU = (0.25, 0.97), (0.35, 0.97)  # cosines of sun and view
 
 # Albedo of water, plants and bare soil; of C07 it is 1 - emissivity. [-]
 ALBEDO = {
