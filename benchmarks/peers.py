@@ -23,34 +23,62 @@ PLANET_RADIUS, LAYER_DEPTH, OBSERVER = 6.372e6, 1000.0, 2e5  # [m], of sasktran2
 
 # Names of a column's arrays, the axes that follow the column's, and where they lie.
 AXES = {"tau": "l", "ssa": "l", "moments": "lm", "albedo": "", "mu0": "", "mu": "", "azimuth": ""}
+# Of columns some of which emit: temperatures of levels and ground [K], where `planck_temperature`
+# says so, and the sun's irradiance, 0 where a column does not emit.
+EMISSION_AXES = {"temperature": "k", "ground_temperature": "", "irradiance": ""}
+WAVENUMBER = 2570.0  # where peers evaluate Planck's function, in a window 1 wide [cm-1]
+# Its constants in CDISORT: of Stefan and Boltzmann [W m-2 K-4], the second of radiation [cm K].
+SIGMA, C2 = 5.67032e-8, 1.438786
 _shared: dict[str, np.ndarray] = {}
 
 
+def planck_temperature(radiance):
+    """Temperature at which Planck's function of the peers is so much at `WAVENUMBER`. [K]"""
+    scale = 15 * SIGMA / np.pi**5 * C2**4 * WAVENUMBER**3
+    with np.errstate(divide="ignore"):
+        return C2 * WAVENUMBER / np.log1p(scale / np.asarray(radiance))
+
+
 @cache
-def _nanodisort_state(num_streams, num_layers, corrected):
+def _nanodisort_state(num_streams, num_layers, corrected, num_moments=NUM_MOMENTS, emits=False):
     nanodisort = importlib.import_module("nanodisort")
     state = nanodisort.DisortState()
-    state.nstr, state.nlyr, state.nmom = num_streams, num_layers, NUM_MOMENTS - 1
+    state.nstr, state.nlyr, state.nmom = num_streams, num_layers, num_moments - 1
     state.ntau = state.numu = state.nphi = 1
     state.usrtau = state.usrang = state.lamber = state.quiet = True
     # Both flags: the correction of Nakajima and Tanaka.
     state.intensity_correction = state.old_intensity_correction = corrected
+    state.planck = emits
+    if emits:
+        state.wvnmlo, state.wvnmhi = WAVENUMBER - 0.5, WAVENUMBER + 0.5
     state.allocate()
     state.utau, state.fbeam, state.phi0, state.accur = np.zeros(1), 1.0, 0.0, 0.0
+    if emits:
+        state.temis, state.ttemp = 1.0, 0.0
     return state
 
 
-def _nanodisort(columns, num_streams, corrected=True):
+def _nanodisort(columns, num_streams, corrected=True, early_stop=0.0, num_moments=NUM_MOMENTS):
     """One solve a column, with its own sun and view; its state is allocated once."""
-    state = _nanodisort_state(num_streams, columns["tau"].shape[1], corrected)
-    tau, ssa, moments, albedo, mu0, mu, azimuth = columns.values()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = (columns[k] for k in AXES)
+    kinds = [
+        _nanodisort_state(num_streams, tau.shape[1], corrected, num_moments, emits)
+        for emits in (False, True)
+    ]
+    irradiance = columns.get("irradiance", np.zeros(len(tau)))
     degrees = 180 - np.degrees(azimuth)  # 0 is forward
     for i in range(len(tau)):
-        state.dtauc, state.ssalb, state.pmom = tau[i], ssa[i], np.ascontiguousarray(moments[i].T)
+        state, sun = kinds[int(irradiance[i] > 0)], 1.0
+        state.accur = early_stop
+        state.dtauc, state.ssalb = tau[i], ssa[i]
+        state.pmom = np.ascontiguousarray(moments[i, :, :num_moments].T)
         state.umu, state.phi = mu[i : i + 1], degrees[i : i + 1]
         state.umu0, state.albedo = mu0[i], albedo[i]
+        if irradiance[i] > 0:
+            state.fbeam = sun = irradiance[i]
+            state.temper, state.btemp = columns["temperature"][i], columns["ground_temperature"][i]
         state.solve()
-        yield np.pi / mu0[i] * state.uu[0, 0, 0]
+        yield np.pi / (mu0[i] * sun) * state.uu[0, 0, 0]
 
 
 def _nanodisort_plain(columns, num_streams):
@@ -66,37 +94,50 @@ def _nanodisort_one_geometry(columns, num_streams):
 
 
 @cache
-def _disortpp_state(num_streams, num_layers):
+def _disortpp_state(num_streams, num_layers, corrected, num_moments, emits):
     disortpp = importlib.import_module("disortpp")
-    config = disortpp.DisortConfig(num_layers, num_streams, NUM_MOMENTS - 1)
+    config = disortpp.DisortConfig(num_layers, num_streams, num_moments - 1)
     flags = config.flags
     flags.use_user_mu = flags.use_user_tau = flags.use_lambertian_surface = True
-    flags.intensity_corr_nakajima = flags.intensity_corr_buras = True
+    flags.intensity_corr_nakajima = flags.intensity_corr_buras = corrected
+    flags.use_thermal_emission = emits
     config.num_user_tau = config.num_user_mu = config.num_phi = 1
-    config.accuracy_fourier_series = 0.0
     config.allocate()
     config.tau_user = [0.0]
     config.bc.direct_beam_flux, config.bc.direct_beam_phi = 1.0, 0.0
+    if emits:
+        config.wavenumber_low, config.wavenumber_high = WAVENUMBER - 0.5, WAVENUMBER + 0.5
+        config.bc.temperature_top, config.bc.emissivity_top = 0.0, 1.0
     return disortpp.DisortSolver(), config
 
 
-def _disortpp(columns, num_streams):
+def _disortpp(columns, num_streams, corrected=True, early_stop=0.0, num_moments=NUM_MOMENTS):
     """One solve a column: its call for many shares sun and view."""
-    solver, config = _disortpp_state(num_streams, columns["tau"].shape[1])
-    tau, ssa, moments, albedo, mu0, mu, azimuth = columns.values()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = (columns[k] for k in AXES)
+    kinds = [
+        _disortpp_state(num_streams, tau.shape[1], corrected, num_moments, emits)
+        for emits in (False, True)
+    ]
+    irradiance = columns.get("irradiance", np.zeros(len(tau)))
     degrees = 180 - np.degrees(azimuth)
     for i in range(len(tau)):
+        (solver, config), sun = kinds[int(irradiance[i] > 0)], 1.0
+        config.accuracy_fourier_series = early_stop
         config.delta_tau, config.single_scat_albedo = tau[i].tolist(), ssa[i].tolist()
-        config.phase_function_moments = moments[i].tolist()
+        config.phase_function_moments = moments[i, :, :num_moments].tolist()
         config.mu_user, config.phi_user = [mu[i]], [degrees[i]]
         config.bc.direct_beam_mu, config.bc.surface_albedo = mu0[i], albedo[i]
-        yield np.pi / mu0[i] * solver.solve(config).intensities(0, 0, 0)
+        if irradiance[i] > 0:
+            config.bc.direct_beam_flux = sun = irradiance[i]
+            config.temperature = columns["temperature"][i].tolist()
+            config.bc.temperature_bottom = columns["ground_temperature"][i]
+        yield np.pi / (mu0[i] * sun) * solver.solve(config).intensities(0, 0, 0)
 
 
 def _pythonic(columns, num_streams):
     """One solve a column; the radiance is interpolated from the quadrature's nodes to the view."""
     package = importlib.import_module("PythonicDISORT")
-    tau, ssa, moments, albedo, mu0, mu, azimuth = columns.values()
+    tau, ssa, moments, albedo, mu0, mu, azimuth = (columns[k] for k in AXES)
     for i in range(len(tau)):
         *_, radiance = package.pydisort(
             np.cumsum(tau[i]),
@@ -118,7 +159,7 @@ def _pythonic(columns, num_streams):
 def _sasktran2(columns, num_streams, derivatives=False):
     """All columns at once, as wavelengths; so all have the sun and view of the first column."""
     sk = importlib.import_module("sasktran2")
-    tau, ssa, moments, albedo, *_ = columns.values()
+    tau, ssa, moments, albedo, *_ = (columns[k] for k in AXES)
     mu0, mu, azimuth = (float(_shared[k][0]) for k in ("mu0", "mu", "azimuth"))
     count, layers = tau.shape
     config = sk.Config()
@@ -210,9 +251,9 @@ def usable_peers(num_streams):
     return [k for k, x in PEERS.items() if peer_version(k) and num_streams >= x.fewest_streams]
 
 
-def _view(buffers, name, num_layers):
-    letters = {"l": num_layers, "m": NUM_MOMENTS}
-    shape = [letters[c] for c in AXES[name]]
+def _view(buffers, name, num_layers, num_moments):
+    letters = {"l": num_layers, "m": num_moments, "k": num_layers + 1}
+    shape = [letters[c] for c in (AXES | EMISSION_AXES)[name]]
     array = np.frombuffer(buffers[name])
     return array[: array.size - array.size % int(np.prod(shape))].reshape(-1, *shape)
 
@@ -237,24 +278,39 @@ def peak_memory(_=None):
 
 
 def _solve(task):
-    name, num_streams, num_layers, start, stop = task
-    _shared.update({k: _view(_shared["buffers"], k, num_layers) for k in AXES})
-    columns = {k: _shared[k][start:stop] for k in AXES}
+    name, num_streams, shape, start, stop, options = task
+    buffers = _shared["buffers"]
+    names = [k for k in AXES | EMISSION_AXES if k in buffers]
+    _shared.update({k: _view(buffers, k, *shape) for k in names})
+    columns = {k: _shared[k][start:stop] for k in names}
     solve = PEERS[name].solve if name in PEERS else REFERENCES[name]
     if name in PEERS and PEERS[name].derivatives:
         columns["start"] = start
-    _shared["brf"][start:stop] = np.fromiter(solve(columns, num_streams), float, stop - start)
+    used = np.frombuffer(buffers["used"], np.int64)[start:stop]
+    brf = _shared["brf"][start:stop]
+    if (used == shape[0]).all():
+        brf[:] = np.fromiter(solve(columns, num_streams, **options), float, stop - start)
+        return peak_memory()
+    # Columns of as many layers are solved together.
+    for layers in np.unique(used):
+        rows = np.flatnonzero(used == layers)
+        own = {k: x[rows] for k, x in columns.items()}
+        own |= {k: own[k][:, :layers] for k in ("tau", "ssa", "moments")}
+        brf[rows] = np.fromiter(solve(own, num_streams, **options), float, len(rows))
     return peak_memory()
 
 
 class Peers:
     """Processes that solve columns; `put` them first."""
 
-    def __init__(self, num_processes, capacity, num_layers):
-        self.num_processes, self.capacity = num_processes, capacity
-        sizes = {"l": num_layers, "m": NUM_MOMENTS}
-        size = {k: capacity * int(np.prod([sizes[c] for c in x])) for k, x in AXES.items()}
-        size |= {"brf": capacity, "gradient": capacity * (2 * num_layers + 1)}
+    def __init__(
+        self, num_processes, capacity, num_layers, num_moments=NUM_MOMENTS, emission=False
+    ):
+        self.num_processes, self.capacity, self.num_moments = num_processes, capacity, num_moments
+        sizes = {"l": num_layers, "m": num_moments, "k": num_layers + 1}
+        axes = AXES | (EMISSION_AXES if emission else {})
+        size = {k: capacity * int(np.prod([sizes[c] for c in x])) for k, x in axes.items()}
+        size |= {"brf": capacity, "used": capacity, "gradient": capacity * (2 * num_layers + 1)}
         self.buffers = {k: RawArray("d", n) for k, n in size.items()}
         before = dict(os.environ)
         # Read when a process loads its linear algebra.
@@ -276,18 +332,28 @@ class Peers:
 
     def put(self, columns):
         """Take the columns of the following calls."""
-        self.num_layers = columns.tau.shape[1]
-        arrays = (columns.tau, columns.ssa, columns.moments(NUM_MOMENTS), columns.albedo)
+        arrays = (columns.tau, columns.ssa, columns.moments(self.num_moments), columns.albedo)
         arrays += (columns.mu0, columns.mu, columns.relative_azimuth)
-        for name, array in zip(AXES, arrays, strict=True):
-            _view(self.buffers, name, self.num_layers)[: len(array)] = array
+        self.put_arrays(dict(zip(AXES, arrays, strict=True)))
 
-    def solve(self, name, num_streams, count):
+    def put_arrays(self, arrays, used=None):
+        """The same of arrays by name; of each column the first `used` layers are there."""
+        self.num_layers = arrays["tau"].shape[1]
+        shape = self.num_layers, self.num_moments
+        for name, array in arrays.items():
+            _view(self.buffers, name, *shape)[: len(array)] = array
+        there = np.frombuffer(self.buffers["used"], np.int64)
+        there[:] = self.num_layers
+        if used is not None:
+            there[: len(used)] = used
+
+    def solve(self, name, num_streams, count, **options):
         """brf of the first `count` columns, and the largest memory of a process [bytes]."""
         calls = self.num_processes * (1 if name in PEERS and PEERS[name].at_once else 4)
         bounds = np.linspace(0, count, min(calls, count) + 1).astype(int).tolist()
+        shape = self.num_layers, self.num_moments
         tasks = [
-            (name, num_streams, self.num_layers, *x)
+            (name, num_streams, shape, *x, options)
             for x in zip(bounds[:-1], bounds[1:], strict=True)
         ]
         memory = self.pool.map(_solve, tasks, chunksize=1)
