@@ -142,7 +142,8 @@ def over_layers(
 ) -> Any:
     """``carry = body(carry, number)`` for every layer to solve; numbers are floating.
 
-    Of one layer that is the only one the number is None: XLA would find no use for it.
+    Of one layer that is the only one the number is None, of which a kernel would make no use
+    (`machine.kernels`).
     """
     tau = plan.layers.tau
     if tau.shape[0] == 1:
