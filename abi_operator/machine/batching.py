@@ -57,7 +57,7 @@ def map_tiles(
     if count == 1:
         return function(columns)
 
-    order = None if need is None else jnp.argsort(need(columns))
+    order = None if need is None else in_order_of_need(need, columns)
     place = None if order is None else _places(order)
 
     # Columns are cut into tiles while their axis is the first, as callers give them, and turned
@@ -89,6 +89,11 @@ def _taken(x: Array, order: Array | None) -> Array:
     if order is None:
         return x
     return x.at[order].get(mode="promise_in_bounds", unique_indices=True)
+
+
+def in_order_of_need(need: Callable[[Any], Array], columns: Any) -> Array:
+    """Columns' numbers, those first that need least."""
+    return jnp.argsort(need(columns))
 
 
 def _places(order: Array) -> Array:

@@ -237,5 +237,5 @@ def _seen_at_once(problem: _Problem) -> Float[Array, "view *batch"]:
     return brf + _scattered_once(layers.tau, ratio, exact, mu0, mu, sun)
 
 
-# Else XLA would compute it column by column, where the result is turned to have the batch first.
+# Else it would be computed column by column, where the result is turned to have the batch first.
 _scattered_once = fenced(exact_single_scattering)

@@ -18,7 +18,7 @@ LEAST_BRF = 0.01
 """Smallest reflectance that an error is compared with. [-]"""
 OF_MERGING = 0.5
 """Share of the budget that one group of merged layers may be estimated to lose."""
-OF_MODES = 0.5
+OF_MODES = 1.0
 """Share of the budget below which an azimuth mode is the last one."""
 OF_DOUBLINGS = 0.2
 """Share of the budget that a layer's response may be off by."""

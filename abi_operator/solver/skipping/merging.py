@@ -93,17 +93,25 @@ def handed_back(
 
 
 def _handed_back(groups: Groups, tau, rows, solved: Solved):
+    number = groups.number.astype(jnp.int32)
+    nothing = jnp.zeros_like(solved.faces)
+    means = jax.lax.fori_loop(
+        0, number, lambda k, means: added_to(means, k, _mean_slopes(solved, k)), nothing
+    )
+
     def give(layer, state):
         above, before, of_tau, of_rows = state
         t, x, label = (read(stack, layer) for stack in (tau, rows, groups.labels))
         above = jnp.where(label == before, above, 0)
 
-        def take(k, found):
-            share = jnp.where(label == k.astype(label.dtype), 1, 0)
-            return found + share * _inside(solved, k, above, t)
+        def take(k, own):
+            share = jnp.where(label == k.astype(label.dtype), 1, 0).astype(t.dtype)
+            group = read(solved.tau, k), read(solved.faces, k), read(solved.faces, k + 1)
+            return jax.tree.map(lambda x, y: x + share * y, own, (*group, read(means, k)))
 
-        inside = _for_groups_of(groups, layer, take, jnp.zeros_like(read(solved.faces, layer)))
-        own = t * inside[1:]
+        slopes = jnp.zeros_like(read(solved.faces, layer))
+        of_its_group = jnp.zeros_like(t), slopes, slopes, slopes
+        inside = _inside(above, t, *_for_groups_of(groups, layer, take, of_its_group))
         slope = inside[0]
         for j in range(x.shape[0]):
             slope = slope + x[j] * inside[1 + j]
@@ -111,29 +119,29 @@ def _handed_back(groups: Groups, tau, rows, solved: Solved):
             above + t,
             label,
             jax.lax.dynamic_update_index_in_dim(of_tau, slope, layer, 0),
-            jax.lax.dynamic_update_index_in_dim(of_rows, own, layer, 0),
+            jax.lax.dynamic_update_index_in_dim(of_rows, t * inside[1:], layer, 0),
         )
 
-    nothing = jnp.zeros_like(tau[0]), jnp.zeros_like(tau[0])
-    start = *nothing, jnp.zeros_like(tau), jnp.zeros_like(rows)
+    first = jnp.zeros_like(tau[0])
+    start = first, first, jnp.zeros_like(tau), jnp.zeros_like(rows)
     return jax.lax.fori_loop(0, tau.shape[0], give, start)[2:]
 
 
-def _inside(solved: Solved, k, above, t):
-    """Slopes in a thickness and in rows times it, where `above` of group k is above it."""
-    depth, means, upper, lower = (
-        read(solved.tau, k),
-        read(solved.rows, k),
-        read(solved.faces, k),
-        read(solved.faces, k + 1),
-    )
-    of_rows = read(solved.row_slopes, k) / depth
-    of_tau = read(solved.tau_slopes, k)
+def _mean_slopes(solved: Solved, k):
+    """What faces have the slopes of, in the mean over a group."""
+    of_rows = read(solved.row_slopes, k) / read(solved.tau, k)
+    of_tau, means = read(solved.tau_slopes, k), read(solved.rows, k)
     for j in range(means.shape[0]):
         of_tau = of_tau - means[j] * of_rows[j]
-    mean = jnp.concatenate([of_tau[None], of_rows])
-    a, b = above / depth, (above + t) / depth
-    middle, curved = (a + b) / 2, (a + b) / 2 - (a * a + a * b + b * b) / 3
+    return jnp.concatenate([of_tau[None], of_rows])
+
+
+def _inside(above, t, depth, upper, lower, mean):
+    """Mean of the parabola over a member with so much of its group above it."""
+    over = 1 / depth
+    a, b = above * over, (above + t) * over
+    middle = (a + b) / 2
+    curved = middle - (a * a + a * b + b * b) / 3
     return (1 - middle - 3 * curved) * upper + (middle - 3 * curved) * lower + 6 * curved * mean
 
 
