@@ -25,6 +25,7 @@ import jax
 import numpy as np
 from pareto_states import make_state
 
+from abi_operator import Geometry
 from abi_operator.band_columns import columns_of_bands
 from abi_operator.optics import ALL_GASES
 from abi_operator.satellites import solar_irradiance
@@ -134,32 +135,46 @@ class Columns:
 
     def moments(self, num_moments):
         """Legendre moments (count, layer, moment) without 2l + 1, computed when asked for."""
-        found = np.empty((*self.tau.shape, num_moments))
+        return self._computed("moments", num_moments, (num_moments,))
+
+    def with_geometry(self, mu0, mu, relative_azimuth):
+        """The same columns, all under one sun and one view."""
+        same = {"mu0": mu0, "mu": mu, "relative_azimuth": relative_azimuth}
+        same = {name: np.full(self.count, x) for name, x in same.items()}
+        geometry = self.source.state.geometry
+        angles = (np.full(geometry.mu0.shape, x) for x in (np.arccos(mu0), np.arccos(mu)))
+        azimuth = np.full(geometry.mu0.shape, relative_azimuth)
+        state = replace(self.source.state, geometry=Geometry(*angles, azimuth))
+        moved = replace(self, source=replace(self.source, state=state), **same)
+        return replace(moved, phase_function=moved._computed("phase_function", 2))
+
+    def _computed(self, name, num_moments, axes=()):
+        """An argument of the solver that has an axis of layers, from the states."""
+        found = np.empty((*self.tau.shape, *axes))
         pixels, of_pixel = np.unique(self.pixel, return_inverse=True)
         for start in range(0, len(pixels), BATCH):
-            groups = self.source.batch(pixels[start : start + BATCH], num_moments, "moments")
+            groups = self.source.batch(pixels[start : start + BATCH], num_moments, name)
             inside = (of_pixel >= start) & (of_pixel < start + BATCH)
             for kind, (group, place, _) in enumerate(self.source.kinds):
                 here = np.flatnonzero(inside & (self.kind == kind))
                 found[here] = groups[group][of_pixel[here] - start, place]
         return found
 
-    def arguments(self, num_streams):
-        """What `toa_brf` takes, or `toa_radiance` where all columns emit, by name."""
+    def arguments(self, num_streams, emits=False):
+        """What `toa_brf` takes by name, or `toa_radiance` of columns that emit."""
         names = ["tau", "ssa", "albedo", "mu0", "mu", "relative_azimuth", "phase_function"]
-        if self.emits.all():
+        if emits:
             names += ["planck_levels", "surface_emission", "solar_irradiance"]
-        elif self.emits.any():
-            raise ValueError("columns that emit and others are two calls; choose rows first.")
         found = {name: np.ascontiguousarray(getattr(self, name)) for name in names}
         return found | {"moments": self.moments(num_streams + 1)}
 
 
-def columns(workload, count, seed, *, shuffled=False, iterate=0):
-    """`count` columns of a workload; see the head of this file."""
+def columns(workload, count, seed, *, shuffled=False, iterate=0, num_layers=None):
+    """`count` columns of a workload; see the head of this file. `num_layers` may be set."""
     given = WORKLOADS[workload]
     rng = np.random.default_rng([seed, list(WORKLOADS).index(workload)])
-    num_layers = int(rng.integers(given.layers[0], given.layers[1], endpoint=True))
+    drawn = int(rng.integers(given.layers[0], given.layers[1], endpoint=True))
+    num_layers = num_layers or drawn
     probe = make_state(1, 2, given.bands, np.random.default_rng(0), **given.holds)
     kinds = _kinds(probe, given)
     num_pixels = -(-count // len(kinds))
