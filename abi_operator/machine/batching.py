@@ -30,6 +30,58 @@ from .sizes import VECTOR
 _FEWEST_A_DEVICE = 4 * VECTOR
 
 
+def tile_by_tile(
+    function: Callable[[list[Array]], Any],
+    leaves: Sequence[Array],
+    own_axes: Sequence[int],
+    tile: int,
+) -> Any:
+    """Apply a batch-last `function` to arrays whose batch comes first, on every CPU device.
+
+    Parameters
+    ----------
+    function
+        Of a list of arrays ``*own batch`` to a pytree of arrays whose last axis is the batch, every
+        column by itself.
+    leaves
+        Its arguments, ``*batch *own``, whose batches broadcast.
+    own_axes
+        Number of axes of each that belong to one column.
+    tile
+        Columns a tile, at most.
+
+    Returns
+    -------
+    What `function` gives of all columns, with the axes of the batch first.
+    """
+
+    def of_share(leaves: Sequence[Array]) -> Any:
+        batch = _outer(leaves, own_axes)[0]
+
+        def batch_last(x: Array, own: int) -> Array:
+            shape = x.shape[x.ndim - own :]
+            full = jnp.broadcast_to(x, (*batch, *shape))
+            return jnp.moveaxis(full.reshape(math.prod(batch), *shape), 0, -1)
+
+        def batch_first(x: Array) -> Array:
+            return jnp.moveaxis(x, -1, 0).reshape(*batch, *x.shape[:-1])
+
+        last = [batch_last(x, own) for x, own in zip(leaves, own_axes, strict=True)]
+        return jax.tree.map(batch_first, map_tiles(function, last, tile))
+
+    batch, shapes = _outer(leaves, own_axes)
+    divided = [len(shape) == len(batch) > 0 and shape[0] == batch[0] for shape in shapes]
+    return on_every_device(of_share, list(leaves), divided)
+
+
+def _outer(
+    leaves: Sequence[Array], own_axes: Sequence[int]
+) -> tuple[tuple[int, ...], list[tuple[int, ...]]]:
+    """Shape of the batch, and of that of each array, which broadcasts to it."""
+    shapes = [x.shape[: x.ndim - own] for x, own in zip(leaves, own_axes, strict=True)]
+    return np.broadcast_shapes(*shapes), shapes
+
+
 def map_tiles(function: Callable[[Any], Any], columns: Any, tile: int) -> Any:
     """Apply a batch-last `function` to a pytree of arrays tile by tile, on every CPU device.
 
