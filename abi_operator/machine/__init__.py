@@ -6,5 +6,8 @@ each other writes a program of a tile of them and enters by `door.enter`, as the
 operator around it; `batching` takes tile by tile, of as many columns as `sizes` says, and `slopes`
 finds their derivatives. Inside, kernels are fenced (`algebra.fenced`) or joined
 (`kernels.one_kernel`), and small matrices are multiplied and eliminated (`algebra`,
-`elimination`). It knows no physics.
+`elimination`). `plain_jax` switches all of that off, for the same numbers by plain JAX: to settle a
+doubt, or where a device or a version of JAX does not suit it. The machine knows no physics.
 """
+
+from .plain import plain_jax as plain_jax

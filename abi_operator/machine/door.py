@@ -30,6 +30,7 @@ from . import compiler
 from .batching import announced, tile_by_tile
 from .chunks import begin_chunks, can_be_cut, map_chunks
 from .kept import Kept
+from .plain import is_plain
 from .program import Program
 from .slopes import Leaves, Slopes, assembled, chosen, contracted, joined
 
@@ -41,6 +42,8 @@ def enter(program: Program, leaves: Leaves) -> Any:
 
 def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     """What is wanted of a program: at once of values, else as one operation of what is traced."""
+    if is_plain():
+        return _plain(program, leaves)
     if not any(isinstance(x, Tracer) for x in leaves):
         return _call(program, what, leaves)
     # Even a conversion that does nothing is linearised where derivatives are taken (`converted`).
@@ -50,6 +53,16 @@ def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     value = program.own_result(leaves)
     like = value if what == "value" else (value, 0)
     return jax.tree.unflatten(jax.tree.structure(like), found)
+
+
+def _plain(program: Program, leaves: Leaves) -> Any:
+    """The value by plain JAX (`plain`), of which derivatives may be taken where it is traced."""
+    if math.prod(_batch_of(program, leaves)) == 0:
+        return _nothing(program, "value", leaves)
+    traced = any(isinstance(x, Tracer) for x in leaves)
+    every = (True,) * len(leaves)
+    fixed = program.unknown(every) if traced else program.known(leaves, "value")
+    return _inside((fixed, "value"), [jnp.asarray(x) for x in leaves])
 
 
 _columns = Primitive("columns")
