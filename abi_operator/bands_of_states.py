@@ -1,4 +1,4 @@
-"""Optics and solver of states, a tile at a time: the program behind every band.
+"""Optics and solver of a tile of states: the program behind every band.
 
 The layers of a tile, with their long moments, are made where they are solved and gone when the next
 tile's turn comes; what is kept of a column is what it sends up, a number a band. Slopes work alike:
@@ -6,7 +6,7 @@ a tile's program gives, beside the values, the slope of every band in every want
 state, and no layers of any other tile exist.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -15,10 +15,9 @@ from jaxtyping import Array, Float
 
 from .atmosphere import State
 from .band_columns import BandColumns, columns_of_bands
-from .machine.batching import map_tiles, on_every_device
 from .machine.door import Leaves
 from .machine.sizes import tile_of_states
-from .machine.slopes import chosen
+from .machine.slopes import slopes_by_copies
 from .optics import num_terms
 from .settings import Settings
 from .solver import sufficient_doublings, toa_brf, toa_radiance
@@ -67,75 +66,32 @@ class Options(NamedTuple):
     settings: Settings
 
 
-def values(leaves: Leaves, structure: Any, options: Options, num_axes: int) -> Array:
-    """Reflectance or radiance ``*batch band`` of states whose leaves have their batch's axes first.
+def of_tile(leaves: Leaves, structure: Any, options: Options) -> Float[Array, "band batch"]:
+    """Reflectance or radiance of a tile of states.
 
     Parameters
     ----------
     leaves, structure
-        Those of `Inputs`.
+        Those of `Inputs`, with one axis of the batch, the last.
     options
         How to solve them.
-    num_axes
-        Axes of the batch.
     """
-
-    def value(tile: Leaves) -> Array:
-        return _solved(_columns(tile, structure, options), options)
-
-    return _tiled(value, leaves, structure, options, num_axes)
+    return _solved(_columns(leaves, structure, options), options)
 
 
-def values_and_slopes(
-    leaves: Leaves,
-    structure: Any,
-    options: Options,
-    num_axes: int,
-    wanted: tuple[bool, ...],
-) -> tuple[Array, list[Array]]:
-    """Values, and the slopes ``*batch band *own`` of the leaves that are wanted.
+def with_slopes(
+    leaves: Leaves, structure: Any, options: Options, wanted: tuple[bool, ...]
+) -> tuple[Float[Array, "band batch"], list[Float[Array, "band *own batch"]]]:
+    """The same, and the slopes of every band in the leaves that are wanted.
 
     Without a number of doublings nothing is known of the layers: see `TRACED_TAU`.
     """
     solved = _solved_unread if options.settings.num_doublings is None else _solved
 
-    def both(tile: Leaves) -> tuple[Array, Leaves]:
-        # Each band has its own copy of what is wanted, so that one pull gives all bands' slopes.
-        def value(copies: Leaves) -> Array:
-            own = iter(copies)
-            merged = [next(own) if w else x for x, w in zip(tile, wanted, strict=True)]
-            columns = _columns(merged, structure, options, wanted)
-            return solved(columns, options)
+    def value(leaves: Leaves) -> Array:
+        return solved(_columns(leaves, structure, options, wanted), options)
 
-        count = len(options.bands)
-        copies = [jnp.broadcast_to(x, (count, *x.shape)) for x in chosen(tile, wanted)]
-        found, pull_back = jax.vjp(value, copies)
-        return found, pull_back(jnp.ones_like(found))[0]
-
-    return _tiled(both, leaves, structure, options, num_axes)
-
-
-def _tiled(
-    function: Callable[[Leaves], Any],
-    leaves: Leaves,
-    structure: Any,
-    options: Options,
-    num_axes: int,
-) -> Any:
-    """`function` of leaves whose batch is last, tile by tile, with the batch's axes first again."""
-
-    def share(leaves: Leaves) -> Any:
-        batch = leaves[0].shape[:num_axes]
-        last = [_batch_last(x, num_axes) for x in leaves]
-        width = tile_size(leaves, structure, options)
-
-        def outward(x: Array) -> Array:
-            x = jnp.moveaxis(x, -1, 0)
-            return x.reshape(*batch, *x.shape[1:])
-
-        return jax.tree.map(outward, map_tiles(function, last, width))
-
-    return on_every_device(share, leaves, [num_axes > 0] * len(leaves))
+    return slopes_by_copies(value, leaves, wanted, len(options.bands))
 
 
 def tile_size(leaves: Leaves, structure: Any, options: Options) -> int:
@@ -149,11 +105,6 @@ def _num_columns(leaves: Leaves, structure: Any, options: Options) -> int:
     air = jax.tree.unflatten(structure, leaves).state.atmosphere
     absorbing = options.settings.gases if air.gases is not None else ()
     return sum(num_terms(band, absorbing) for band in options.bands)
-
-
-def _batch_last(x: Array, num_axes: int) -> Array:
-    own = x.shape[num_axes:]
-    return jnp.moveaxis(x.reshape(-1, *own), 0, -1)
 
 
 def _columns(

@@ -9,7 +9,6 @@ them, unless the layer lets no light through anyway. A program for values alone 
 as it needs, whoever can read it (`solver.method.doublings`).
 """
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -18,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .band_columns import HARMLESS_ZENITH, columns_of_bands
-from .bands_of_states import Inputs, Options, tile_size, values, values_and_slopes
+from .bands_of_states import Inputs, Options, of_tile, tile_size, with_slopes
 from .machine.door import Leaves, enter
 from .machine.sizes import chunks_of_states, chunks_to_read
 from .solver import sufficient_doublings
@@ -40,7 +39,7 @@ def solve(inputs: Inputs, options: Options) -> Float[Array, "*batch band"]:
 
 
 class _Program(NamedTuple):
-    """`machine.door.Program` of the leaves of `Inputs`, which for slopes reads the layers."""
+    """`machine.program.Program` of the leaves of `Inputs`, which for slopes reads the layers."""
 
     structure: Any
     options: Options
@@ -74,19 +73,23 @@ class _Program(NamedTuple):
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         return chunks_of_states(tile_size(leaves, self.structure, self.options))
 
+    def tile(self, leaves: Leaves) -> int:
+        return tile_size(leaves, self.structure, self.options)
+
+    def need(self, leaves: Leaves) -> None:
+        return None
+
     def value(self, leaves: Leaves) -> Array:
-        full, num_axes = _uniform(leaves, self.own_axes)
-        return values(full, self.structure, self.options, num_axes)
+        return of_tile(leaves, self.structure, self.options)
 
     def value_and_slopes(
         self, leaves: Leaves, wanted: tuple[bool, ...]
     ) -> tuple[Array, list[Array]]:
-        full, num_axes = _uniform(leaves, self.own_axes)
-        return values_and_slopes(full, self.structure, self.options, num_axes, wanted)
+        return with_slopes(leaves, self.structure, self.options, wanted)
 
 
 class _Depths(NamedTuple):
-    """`door.Program` of the largest optical depth of any layer of a column, in any band. [-]"""
+    """The same of the largest optical depth of any layer of a column, in any band. [-]"""
 
     structure: Any
     options: Options
@@ -104,30 +107,21 @@ class _Depths(NamedTuple):
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         return 1, *chunks_to_read()
 
-    def value(self, leaves: Leaves) -> Array:
-        full, num_axes = _uniform(leaves, self.own_axes)
+    def tile(self, leaves: Leaves) -> int:
+        return chunks_to_read()[-1]
 
-        def of_one(leaves: Leaves) -> Array:
+    def need(self, leaves: Leaves) -> None:
+        return None
+
+    def value(self, leaves: Leaves) -> Array:
+        def of_one(leaves: list[Array]) -> Array:
             state = jax.tree.unflatten(self.structure, leaves).state
             settings = self.options.settings
             num_moments = settings.num_streams + 1
             groups = columns_of_bands(state, self.options.bands, settings.gases, num_moments)
             return jnp.max(jnp.stack([jnp.max(x.arguments["tau"]) for x in groups]))
 
-        for _ in range(num_axes):
-            of_one = jax.vmap(of_one)
-        return of_one(full)
+        return jax.vmap(of_one, in_axes=-1)(list(leaves))
 
     def value_and_slopes(self, leaves: Leaves, wanted: tuple[bool, ...]) -> Any:
         raise TypeError("what is read to choose a program has no derivative.")
-
-
-def _uniform(leaves: Leaves, own_axes: Sequence[int]) -> tuple[list[Array], int]:
-    """Leaves with the same axes of the batch, and the number of these."""
-    shapes = [x.shape[: x.ndim - own] for x, own in zip(leaves, own_axes, strict=True)]
-    batch = jnp.broadcast_shapes(*shapes)
-    full = [
-        jnp.broadcast_to(x, (*batch, *x.shape[len(shape) :]))
-        for x, shape in zip(leaves, shapes, strict=True)
-    ]
-    return full, len(batch)

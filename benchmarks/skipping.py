@@ -51,13 +51,13 @@ def without(kinds):
     shares = {k: getattr(budget, k) for k in kinds - {"order"}}
     for name in shares:
         setattr(budget, name, NOTHING[name])
-    in_order = batching.in_order_of_need
+    in_order = batching.in_order
     if "order" in kinds:
-        batching.in_order_of_need = lambda need, columns: None
+        batching.in_order = lambda need: None
     try:
         yield
     finally:
-        batching.in_order_of_need = in_order
+        batching.in_order = in_order
         for name, share in shares.items():
             setattr(budget, name, share)
 

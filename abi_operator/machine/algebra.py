@@ -16,6 +16,8 @@ import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
 from jaxtyping import Array, Float, Int
 
+from .plain import is_plain
+
 _WRITTEN_OUT = 16  # longest sum of a matrix product that is written out
 _IN_PARTS = range(5, 9)  # such sums are two operations in float32
 
@@ -40,10 +42,13 @@ def fenced(function: Callable) -> Callable:
     `jax.jit` inside becomes such a call, too, also those in JAX's own functions. An `Entry` among
     the arguments reaches `function` as an array.
     """
-    compiled = jax.jit(_reading(function))
+    reading = _reading(function)
+    compiled = jax.jit(reading)
 
     @wraps(function)
     def call(*args):
+        if is_plain():
+            return reading(*args)
         # As arguments, Python's numbers would be of double precision.
         arrays = [x for x in jax.tree.leaves(args) if not isinstance(x, float)]
         dtype = jnp.result_type(*(x for x in arrays if jnp.issubdtype(x.dtype, jnp.floating)))
@@ -225,7 +230,7 @@ def weighted_sum(
     expand = (...,) + (None,) * (weights.ndim - 1)
     result: Any = None if more is None else more[expand]
     if weights.shape[0] > _WRITTEN_OUT:
-        summed = jnp.tensordot(matrices, weights, axes=1)
+        summed = jnp.tensordot(matrices, weights, axes=1, precision=jax.lax.Precision.HIGHEST)
         return summed if result is None else result + summed
     # Few terms at a time: `kernels.one_kernel` asks for no more arithmetic than bytes in each.
     terms = 2 if weights.dtype == jnp.float32 else 4

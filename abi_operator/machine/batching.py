@@ -30,11 +30,66 @@ from .sizes import VECTOR
 _FEWEST_A_DEVICE = 4 * VECTOR
 
 
+def tile_by_tile(
+    function: Callable[[list[Array]], Any],
+    leaves: Sequence[Array],
+    own_axes: Sequence[int],
+    tile: int,
+    need: Callable[[list[Array]], Array | None] | None = None,
+) -> Any:
+    """Apply a batch-last `function` to arrays whose batch comes first, on every CPU device.
+
+    Parameters
+    ----------
+    function
+        Of a list of arrays ``*own batch`` to a pytree of arrays whose last axis is the batch, every
+        column by itself.
+    leaves
+        Its arguments, ``*batch *own``, whose batches broadcast.
+    own_axes
+        Number of axes of each that belong to one column.
+    tile
+        Columns a tile, at most.
+    need
+        As in `map_tiles`, of such a list.
+
+    Returns
+    -------
+    What `function` gives of all columns, with the axes of the batch first.
+    """
+
+    def of_share(leaves: Sequence[Array]) -> Any:
+        batch = _outer(leaves, own_axes)[0]
+
+        def batch_last(x: Array, own: int) -> Array:
+            shape = x.shape[x.ndim - own :]
+            full = jnp.broadcast_to(x, (*batch, *shape))
+            return jnp.moveaxis(full.reshape(math.prod(batch), *shape), 0, -1)
+
+        def batch_first(x: Array) -> Array:
+            return jnp.moveaxis(x, -1, 0).reshape(*batch, *x.shape[:-1])
+
+        last = [batch_last(x, own) for x, own in zip(leaves, own_axes, strict=True)]
+        return jax.tree.map(batch_first, map_tiles(function, last, tile, need))
+
+    batch, shapes = _outer(leaves, own_axes)
+    divided = [len(shape) == len(batch) > 0 and shape[0] == batch[0] for shape in shapes]
+    return on_every_device(of_share, list(leaves), divided)
+
+
+def _outer(
+    leaves: Sequence[Array], own_axes: Sequence[int]
+) -> tuple[tuple[int, ...], list[tuple[int, ...]]]:
+    """Shape of the batch, and of that of each array, which broadcasts to it."""
+    shapes = [x.shape[: x.ndim - own] for x, own in zip(leaves, own_axes, strict=True)]
+    return np.broadcast_shapes(*shapes), shapes
+
+
 def map_tiles(
     function: Callable[[Any], Any],
     columns: Any,
     tile: int,
-    need: Callable[[Any], Array] | None = None,
+    need: Callable[[Any], Array | None] | None = None,
 ) -> Any:
     """Apply a batch-last `function` to a pytree of arrays tile by tile, on every CPU device.
 
@@ -49,7 +104,7 @@ def map_tiles(
         Columns a tile, at most.
     need
         Maps columns to a number each, by which they are sorted before they are cut into tiles:
-        those in a tile are then alike. None leaves them as they come.
+        those in a tile are then alike. None, for itself or from it, leaves them as they come.
     """
     size = jax.tree.leaves(columns)[0].shape[-1]
     devices = _devices(size)
@@ -57,7 +112,8 @@ def map_tiles(
     if count == 1:
         return function(columns)
 
-    order = None if need is None else in_order_of_need(need, columns)
+    numbers = None if need is None else need(columns)
+    order = None if numbers is None else in_order(numbers)
     place = None if order is None else _places(order)
 
     # Columns are cut into tiles while their axis is the first, as callers give them, and turned
@@ -91,9 +147,9 @@ def _taken(x: Array, order: Array | None) -> Array:
     return x.at[order].get(mode="promise_in_bounds", unique_indices=True)
 
 
-def in_order_of_need(need: Callable[[Any], Array], columns: Any) -> Array:
-    """Columns' numbers, those first that need least."""
-    return jnp.argsort(need(columns))
+def in_order(need: Array) -> Array | None:
+    """Places of columns, those first that need least."""
+    return jnp.argsort(need)
 
 
 def _places(order: Array) -> Array:

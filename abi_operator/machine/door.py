@@ -16,7 +16,7 @@ all transformations are done is traced inside, once, as it is compiled: `jax.cus
 import math
 from collections.abc import Sequence
 from functools import cache, lru_cache, partial
-from typing import Any, Protocol, Self
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -24,55 +24,15 @@ import numpy as np
 from jax.core import ShapedArray, Tracer, eval_context
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from . import compiler
-from .batching import announced
+from .batching import announced, tile_by_tile
 from .chunks import begin_chunks, can_be_cut, map_chunks
 from .kept import Kept
+from .plain import is_plain
+from .program import Program
 from .slopes import Leaves, Slopes, assembled, chosen, contracted, joined
-
-
-class Program(Protocol):
-    """What is solved, hashable: equal programs are compiled once.
-
-    Arguments are a list of arrays with the axes of the batch first, which broadcast.
-    """
-
-    @property
-    def own_axes(self) -> tuple[int, ...]:
-        """Number of axes of each argument that belong to one column."""
-        ...
-
-    def known(self, leaves: Leaves, what: Any) -> Self:
-        """The program of `what` is wanted of columns that can be read."""
-        ...
-
-    def unknown(self, what: Any) -> Self:
-        """The program of `what` is wanted of columns that cannot be read."""
-        ...
-
-    def own_result(self, leaves: Leaves) -> Any:
-        """What `value` gives of one column: a pytree of `jax.ShapeDtypeStruct`."""
-        ...
-
-    def widths(self, leaves: Leaves, what: Any) -> Sequence[int]:
-        """Numbers of columns that are worth a program of what is wanted, rising."""
-        ...
-
-    def value(self, leaves: Leaves) -> Any:
-        """A pytree of arrays with the batch's axes first."""
-        ...
-
-    def value_and_slopes(
-        self, leaves: Leaves, wanted: tuple[bool, ...]
-    ) -> tuple[Any, list[Float[Array, "..."]]]:
-        """The same, and the slope of every row of it in the arguments that are wanted.
-
-        Rows number the entries of a column's result: those of its first array in order, then those
-        of its second, and so on. Slopes in what columns share are each column's own.
-        """
-        ...
 
 
 def enter(program: Program, leaves: Leaves) -> Any:
@@ -82,6 +42,8 @@ def enter(program: Program, leaves: Leaves) -> Any:
 
 def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     """What is wanted of a program: at once of values, else as one operation of what is traced."""
+    if is_plain():
+        return _plain(program, leaves)
     if not any(isinstance(x, Tracer) for x in leaves):
         return _call(program, what, leaves)
     # Even a conversion that does nothing is linearised where derivatives are taken (`converted`).
@@ -91,6 +53,16 @@ def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     value = program.own_result(leaves)
     like = value if what == "value" else (value, 0)
     return jax.tree.unflatten(jax.tree.structure(like), found)
+
+
+def _plain(program: Program, leaves: Leaves) -> Any:
+    """The value by plain JAX (`plain`), of which derivatives may be taken where it is traced."""
+    if math.prod(_batch_of(program, leaves)) == 0:
+        return _nothing(program, "value", leaves)
+    traced = any(isinstance(x, Tracer) for x in leaves)
+    every = (True,) * len(leaves)
+    fixed = program.unknown(every) if traced else program.known(leaves, "value")
+    return _inside((fixed, "value"), [jnp.asarray(x) for x in leaves])
 
 
 _columns = Primitive("columns")
@@ -293,10 +265,12 @@ def _flat(x: np.ndarray, own_axes: int, batch: tuple[int, ...]) -> np.ndarray:
 def _wanted(of: tuple[Program, Any], leaves: Leaves) -> Any:
     """The value, or the value and the slopes in what is wanted, `joined`."""
     program, what = of
+    own_axes, tile = program.own_axes, program.tile(leaves)
     if what == "value":
-        return program.value(leaves)
-    value, slopes = program.value_and_slopes(leaves, what)
-    return value, joined(slopes, chosen(program.own_axes, what))
+        return tile_by_tile(program.value, leaves, own_axes, tile, program.need)
+    both = partial(program.value_and_slopes, wanted=what)
+    value, slopes = tile_by_tile(both, leaves, own_axes, tile, program.need)
+    return value, joined(slopes, chosen(own_axes, what))
 
 
 _inside = jax.jit(_wanted, static_argnums=0)

@@ -31,6 +31,7 @@ from jax.experimental import serialize_executable
 from jax.tree_util import PyTreeDef
 
 from .._ending import unfinished
+from .plain import is_plain
 from .processor import processor_key
 
 # What may take part in a trace. What is pickled by its name alone must come from one of these.
@@ -72,11 +73,11 @@ class Kept:
     def prepare(self, fixed: Hashable, *arguments: Any) -> None:
         """Compile or read what a call needs; `jax.jit` compiles in calling."""
         program = self._program(fixed, arguments)
-        if _folder is None:
+        if _folder is None or is_plain():
             program(*arguments)
 
     def _program(self, fixed: Hashable, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        if _folder is None:
+        if _folder is None or is_plain():
             return partial(self._jitted, fixed)
         leaves, structure = jax.tree.flatten(arguments)
         shapes = tuple((x.shape, np.dtype(x.dtype).str) for x in leaves)

@@ -18,6 +18,8 @@ from jax.extend.core import ClosedJaxpr, Primitive, jaxpr_as_fun
 from jax.interpreters import ad, batching, mlir
 from jax.interpreters import partial_eval as pe
 
+from .plain import is_plain
+
 # Rows of matrices up to which a layer is one kernel: see `one_kernel`.
 _LARGEST, _LARGEST_OF_FLOAT32 = 8, 4
 
@@ -61,6 +63,8 @@ def one_kernel(
     """
 
     def call(*args: Any) -> Any:
+        if is_plain():
+            return function(*args)
         leaves, structure = jax.tree.flatten(args)
 
         def flat(*leaves: Any) -> Any:

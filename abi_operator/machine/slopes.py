@@ -7,7 +7,7 @@ of some hundred columns of 4 streams.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -29,40 +29,69 @@ def chosen(items: Leaves, wanted: Sequence[bool]) -> list[Any]:
 
 
 def slopes_by_reverse_mode(
-    value: Any, leaves: Leaves, wanted: Sequence[bool], own_axes: Sequence[int]
-) -> tuple[Any, list[Float[Array, "..."]]]:
-    """Value and slopes of a function of leaves, in one sweep for all columns.
+    value: Callable[[list[Any]], Any], leaves: Leaves, wanted: Sequence[bool]
+) -> tuple[Any, list[Float[Array, "row *own batch"]]]:
+    """Value of a tile, and the slope of every row of it in the leaves that are wanted.
 
-    Those of other columns do not change a column's result, so that one pull gives all of them.
+    Parameters
+    ----------
+    value
+        Of leaves whose last axis is the batch to a pytree of arrays with that last axis, every
+        column by itself. Rows number the entries of a column's result: those of the first array in
+        order, then those of the second, and so on.
+    leaves
+        Its arguments.
+    wanted
+        Those in which there are slopes to find.
     """
-    counts = [x.ndim - own for x, own in zip(leaves, own_axes, strict=True)]
-    batch = jnp.broadcast_shapes(*(x.shape[:n] for x, n in zip(leaves, counts, strict=True)))
-    full = [
-        jnp.broadcast_to(x, (*batch, *x.shape[n:])) if use else x
-        for x, n, use in zip(leaves, counts, wanted, strict=True)
-    ]
-
-    def of_wanted(some: Leaves) -> Any:
-        rest = iter(some)
-        return value([next(rest) if use else x for x, use in zip(full, wanted, strict=True)])
-
-    result, pull_back = jax.vjp(of_wanted, chosen(full, wanted))
+    result, pull_back = jax.vjp(partial(_with, value, leaves, wanted), chosen(leaves, wanted))
     outputs, structure = jax.tree.flatten(result)
-    shapes = [x.shape[len(batch) :] for x in outputs]
-    rows = np.eye(sum(math.prod(x) for x in shapes), dtype=outputs[0].dtype)
+    counts = [math.prod(x.shape[:-1]) for x in outputs]
 
-    def slopes_of(row: Array) -> list[Array]:
-        parts = jnp.split(row, np.cumsum([math.prod(x) for x in shapes])[:-1])
+    def slopes_of(row: Float[Array, " row"]) -> list[Array]:
+        # One pull for all columns: those of others do not change a column's result.
+        parts = jnp.split(row, np.cumsum(counts)[:-1])
         seeds = [
-            jnp.broadcast_to(part.reshape(shape), x.shape)
-            for part, shape, x in zip(parts, shapes, outputs, strict=True)
+            jnp.broadcast_to(part.reshape(*x.shape[:-1], 1), x.shape)
+            for part, x in zip(parts, outputs, strict=True)
         ]
         return pull_back(jax.tree.unflatten(structure, seeds))[0]
 
-    if len(rows) == 1:
-        return result, [jnp.expand_dims(x, len(batch)) for x in slopes_of(jnp.asarray(rows[0]))]
-    slopes = jax.vmap(slopes_of)(jnp.asarray(rows))
-    return result, [jnp.moveaxis(x, 0, len(batch)) for x in slopes]
+    rows = jnp.eye(sum(counts), dtype=outputs[0].dtype)
+    if len(rows) == 1:  # nothing comes before the axes of the one sweep
+        return result, [x[None] for x in slopes_of(rows[0])]
+    return result, jax.vmap(slopes_of)(rows)
+
+
+def slopes_by_copies(
+    value: Callable[[list[Any]], Float[Array, "row batch"]],
+    leaves: Leaves,
+    wanted: Sequence[bool],
+    num_rows: int,
+) -> tuple[Float[Array, "row batch"], list[Float[Array, "row *own batch"]]]:
+    """The same of rows that can be given a copy each of what is wanted: one pull finds all slopes.
+
+    Parameters
+    ----------
+    value
+        As above, of leaves of which those that are wanted have a copy for every row, along their
+        first axis. The rows must not see each other's.
+    leaves, wanted
+        As above.
+    num_rows
+        Rows of the result.
+    """
+    copies = [jnp.broadcast_to(x, (num_rows, *x.shape)) for x in chosen(leaves, wanted)]
+    result, pull_back = jax.vjp(partial(_with, value, leaves, wanted), copies)
+    return result, pull_back(jnp.ones_like(result))[0]
+
+
+def _with(
+    value: Callable[[list[Any]], Any], leaves: Leaves, wanted: Sequence[bool], some: Leaves
+) -> Any:
+    """A function of leaves, of which those that are wanted are exchanged for others."""
+    others = iter(some)
+    return value([next(others) if use else x for x, use in zip(leaves, wanted, strict=True)])
 
 
 def joined(slopes: Sequence[Float[Array, "..."]], own_axes: Sequence[int]) -> Float[Array, "..."]:

@@ -1,8 +1,6 @@
 """A column as the solver takes it: the arguments of its doors, promoted, checked and aligned."""
 
-import math
-from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import jax
@@ -11,7 +9,6 @@ import numpy as np
 from jax.core import Tracer
 
 from ..machine.algebra import converted
-from ..machine.batching import on_every_device
 from .method.doublings import sufficient_doublings
 from .method.surface import AnySurface, Lambertian
 
@@ -178,60 +175,26 @@ def choose_doublings(column: Column, num_streams: int) -> int:
     return sufficient_doublings(max_tau, min_mu, num_streams)
 
 
-def solved(column: Column, multiple_views: bool, solve: Callable[[Column], Any]) -> Any:
-    """What `solve` makes of aligned columns, its batch's axes first and in their shape again.
-
-    Parameters
-    ----------
-    column
-        Promoted arguments, whose batches broadcast.
-    multiple_views
-        Whether there is an axis of views, in the arguments and in those results that have one.
-    solve
-        Maps columns with their batch last (`aligned`) to a pytree of ``*view batch``.
-    """
-
-    def share(column: Column) -> Any:
-        columns, batch = aligned(column, multiple_views)
-        return jax.tree.map(partial(_outward, batch, multiple_views), solve(columns))
-
-    shapes = [x.shape[: x.ndim - len(own_axes(k, multiple_views))] for k, x in _leaves(column)]
-    batch = np.broadcast_shapes(*shapes)
-    divided = [len(shape) == len(batch) > 0 and shape[0] == batch[0] for shape in shapes]
-    return on_every_device(share, column, divided)
-
-
-def _outward(batch: tuple[int, ...], multiple_views: bool, x: jax.Array) -> jax.Array:
-    """From ``*view batch`` to the batch's axes, and the views' where there are several."""
-    views = x.shape[:-1] if multiple_views else ()
-    return jnp.moveaxis(x, -1, 0).reshape(*batch, *views)
-
-
-def aligned(column: Column, multiple_views: bool) -> tuple[Column, tuple[int, ...]]:
-    """Batch broadcast, flattened and moved last in every leaf; the batch's shape outside.
+def aligned(column: Column, multiple_views: bool) -> Column:
+    """A column whose batch is last in every leaf, with all its own axes.
 
     A single view gets its axis; an argument shared by layers or views gets one entry for each.
     """
-    leaves = _leaves(column)
-    count = {name: len(own_axes(name, multiple_views)) for name, _ in leaves}
-    batch = jnp.broadcast_shapes(*(x.shape[: x.ndim - count[name]] for name, x in leaves))
-    num_layers = max(column.tau.shape[-1], column.ssa.shape[-1], column.moments.shape[-2])
+    num_layers = max(column.tau.shape[0], column.ssa.shape[0], column.moments.shape[0])
     num_views = 1
     if multiple_views:
-        num_views = max(x.shape[-1] for x in (column.mu, column.relative_azimuth))
+        num_views = max(x.shape[0] for x in (column.mu, column.relative_azimuth))
+    sizes = {"layer": num_layers, "view": num_views}
 
     def inward(name: str, x: jax.Array) -> jax.Array:
-        own = list(x.shape[x.ndim - count[name] :])
         axes = OWN_AXES.get(name, ())
         if "view" in axes and not multiple_views:
-            x, own = x[..., None], [*own, 1]
-        sizes = {"layer": num_layers, "view": num_views}
-        own = [sizes.get(axis, size) for axis, size in zip(axes, own, strict=True)]
-        full = jnp.broadcast_to(x, (*batch, *own))
-        return jnp.moveaxis(full.reshape(math.prod(batch), *own), 0, -1)
+            x = x[..., None, :]
+        own = [sizes.get(axis, size) for axis, size in zip(axes, x.shape, strict=False)]
+        return jnp.broadcast_to(x, (*own, x.shape[-1]))
 
     fields = {
         name: jax.tree.map(lambda leaf, name=name: inward(name, leaf), value)
         for name, value in column._asdict().items()
     }
-    return Column(**fields), batch
+    return Column(**fields)

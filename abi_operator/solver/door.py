@@ -6,20 +6,20 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array
 
 from ..machine.door import Leaves, enter
-from ..machine.independent_columns import independent_columns
 from ..machine.sizes import chunks_of_columns, tile_size
-from ..machine.slopes import slopes_by_reverse_mode
+from ..machine.slopes import chosen, slopes_by_reverse_mode
 from .checks import check_arguments, check_in_memory
 from .column import (
     Column,
     Options,
+    aligned,
     check_shapes,
     choose_doublings,
     names,
     own_axes,
-    solved,
 )
 from .method.doublings import unknown_doublings
 from .program import need
@@ -46,7 +46,9 @@ def solve(
     settings
         How to solve it.
     gradient
-        As in `independent_columns`, of `tile`.
+        Maps such columns to what `tile` gives and to a `Column` of slopes, ``row *own batch`` in
+        place of each ``*own batch``; see `machine.program.Program`. None is reverse mode through
+        `tile`.
     by_view
         Which results of `tile` have an axis of views: a pytree of bools of the same structure.
     given
@@ -80,9 +82,9 @@ def _options(column: Column, settings: Settings) -> Options:
 
 
 class _Program(NamedTuple):
-    """`machine.door.Program` of a door's arguments; for slopes it has a number of doublings."""
+    """`machine.program.Program` of a door's arguments; for slopes it has a number of doublings."""
 
-    tile: Callable[[Column, Options], Any]
+    solve: Callable[[Column, Options], Any]
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None
     options: Options
     multiple_views: bool
@@ -123,19 +125,33 @@ class _Program(NamedTuple):
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         return chunks_of_columns(self.options.num_streams, leaves[0].dtype)
 
+    def tile(self, leaves: Leaves) -> int:
+        return tile_size(self.options.num_streams, jnp.result_type(*leaves))
+
+    def need(self, leaves: Leaves) -> Array | None:
+        if self.options.error_budget is None:
+            return None
+        return need(self._aligned(leaves), self.options)
+
     def value(self, leaves: Leaves) -> Any:
-        column = jax.tree.unflatten(self.structure, leaves)
-        gradient = self.gradient
-        solve = independent_columns(
-            lambda tile: self.tile(tile, self.options),
-            tile_size(self.options.num_streams, jnp.result_type(*leaves)),
-            None if gradient is None else lambda tile: gradient(tile, self.options),
-            None if self.options.error_budget is None else lambda tile: need(tile, self.options),
-        )
-        return solved(column, self.multiple_views, solve)
+        return self._outward(self.solve(self._aligned(leaves), self.options))
 
     def value_and_slopes(self, leaves: Leaves, wanted: tuple[bool, ...]) -> tuple[Any, list[Any]]:
-        return slopes_by_reverse_mode(self.value, leaves, wanted, self.own_axes)
+        if self.gradient is None:
+            return slopes_by_reverse_mode(self.value, leaves, wanted)
+        column, pull_back = jax.vjp(self._aligned, leaves)
+        value, slopes = self.gradient(column, self.options)
+        own = jax.vmap(lambda row: pull_back(row)[0])(slopes)
+        return self._outward(value), chosen(own, wanted)
+
+    def _aligned(self, leaves: Leaves) -> Column:
+        return aligned(jax.tree.unflatten(self.structure, leaves), self.multiple_views)
+
+    def _outward(self, result: Any) -> Any:
+        """Results of a tile, without the axis of the one view where there are not several."""
+        if self.multiple_views:
+            return result
+        return jax.tree.map(lambda x: x.reshape(x.shape[-1:]), result)
 
 
 @cache

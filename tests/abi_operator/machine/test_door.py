@@ -34,13 +34,25 @@ class Waves:
     def widths(self, leaves, what):
         return 4, 16
 
+    def tile(self, leaves):
+        return 8
+
+    def need(self, leaves):
+        return None
+
     def value(self, leaves):
         self.traced.append("value")
-        return plain(*leaves)
+        return of_tile(leaves)
 
     def value_and_slopes(self, leaves, wanted):
         self.traced.append(wanted)
-        return slopes_by_reverse_mode(lambda x: plain(*x), leaves, wanted, OWN_AXES)
+        return slopes_by_reverse_mode(of_tile, leaves, wanted)
+
+
+def of_tile(leaves):
+    """Of arrays with the batch last."""
+    rows, x, power = leaves
+    return plain(jnp.moveaxis(rows, -1, 0), x, power)
 
 
 def plain(rows, x, power):
