@@ -32,6 +32,7 @@ def test_the_solvers_block_runs():
     names = run_block(2)
     # Two solves of the same columns, in one of which the ground is a closed form.
     np.testing.assert_allclose(names["response"].brf(0.1), names["brf"], rtol=1e-12)
+    np.testing.assert_allclose(names["quick"], names["brf"], rtol=1e-3)
     assert 0.4 < names["share"] < 0.7 and names["warm"] > 0
 
 
