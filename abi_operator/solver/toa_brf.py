@@ -1,13 +1,12 @@
 """The solver's door for reflectances: plane-parallel columns seen from the top."""
 
-import jax
-import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .column import Column, Options, promoted
 from .door import prepare, solve
 from .method.surface import AnySurface
 from .program import emerging
+from .views import of_views
 
 
 def toa_brf(
@@ -121,22 +120,4 @@ def _brf(tile: Column, options: Options) -> Array:
 
 
 def _view_by_view(tile: Column, options: Options) -> tuple[Array, Column]:
-    """Reflectance of every view, and its slopes, by the derivative of one view (`adjoint`).
-
-    Views share most of a value, but nothing of a gradient, whose light comes from the view.
-    """
-
-    def of_one(view: Array) -> tuple[Array, Column]:
-        def brf(tile: Column) -> Array:
-            phase = tile.phase_function
-            seen = tile._replace(
-                mu=tile.mu[view][None],
-                relative_azimuth=tile.relative_azimuth[view][None],
-                phase_function=None if phase is None else phase[:, view][:, None],
-            )
-            return emerging(seen, options).brf[0]
-
-        value, pull_back = jax.vjp(brf, tile)
-        return value, pull_back(jnp.ones_like(value))[0]
-
-    return jax.lax.map(of_one, jnp.arange(tile.mu.shape[0]))
+    return of_views(lambda seen: emerging(seen, options).brf[0], tile)

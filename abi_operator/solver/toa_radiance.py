@@ -7,7 +7,8 @@ from jaxtyping import Array, ArrayLike, Float
 from .column import Column, Options, promoted
 from .door import prepare, solve
 from .method.surface import AnySurface
-from .program import emerging
+from .program import emerging, radiance_of_one_view
+from .views import of_views
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
 _LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5
@@ -97,7 +98,8 @@ num_doublings, check_values
         num_doublings=num_doublings,
         check_values=check_values,
     )
-    return solve(_radiance, column, options, multiple_views, check_values=check_values)
+    gradient = _view_by_view if multiple_views else None
+    return solve(_radiance, column, options, multiple_views, gradient, check_values=check_values)
 
 
 def _with_harmless_sun(column: Column) -> Column:
@@ -111,7 +113,14 @@ def _with_harmless_sun(column: Column) -> Column:
 
 
 def _radiance(tile: Column, options: Options) -> Array:
-    brf, emitted = emerging(tile, options)
     assert tile.solar_irradiance is not None
+    shine = tile.planck_levels, tile.surface_emission, tile.isotropic_top
+    if tile.mu.shape[0] == 1 and any(x is not None for x in shine):
+        return radiance_of_one_view(tile, options)[None]
+    brf, emitted = emerging(tile, options)
     reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf
     return reflected if emitted is None else reflected + emitted
+
+
+def _view_by_view(tile: Column, options: Options) -> tuple[Array, Column]:
+    return of_views(lambda seen: _radiance(seen, options)[0], tile)
