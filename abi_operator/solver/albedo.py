@@ -1,18 +1,28 @@
 """Fluxes that the azimuthal mean knows: plane albedo, and the ground's part in a reflectance."""
 
-from typing import Unpack
+from collections.abc import Callable
+from typing import Any, Unpack
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._keywords import with_keywords
-from .column import promoted
+from .column import Column, Options, promoted
 from .door import solve
 from .method.surface import AnySurface
-from .program import GroundResponse, ground_response, plane_albedo
+from .program import (
+    GroundResponse,
+    back_to_ground,
+    from_ground,
+    ground_response,
+    over_black_ground,
+    plane_albedo,
+)
 from .settings import OfFluxes, OfViews, Settings
+from .views import of_views
 
 
 @with_keywords(OfFluxes, Settings())
@@ -123,5 +133,30 @@ def surface_coupling(
     )
     how = Settings(**settings)
     by_view = GroundResponse._make([True, True, False])  # the spherical albedo has no view
-    black, coupling, spherical = solve(ground_response, column, how, by_view=by_view)
+    found = solve(ground_response, column, how, gradient=response_and_slopes, by_view=by_view)
+    black, coupling, spherical = found
     return SurfaceCoupling(black, coupling, spherical, how.multiple_views)
+
+
+def response_and_slopes(tile: Column, options: Options) -> tuple[GroundResponse, Column]:
+    """Response and its slopes, of every view's reflectance and coupling and of what all share."""
+
+    def slopes_of(function: Callable[..., Array], *others: Any) -> tuple[Array, Column]:
+        value, pull_back = jax.vjp(lambda tile: function(tile, options, *others), tile)
+        return value, pull_back(jnp.ones_like(value))[0]
+
+    brf, of_brf = of_views(lambda seen: over_black_ground(seen, options)[0], tile)
+    # Sunlight reaches the ground as light of the ground reaches the sun.
+    beams = jnp.arange(tile.mu.shape[0] + 1)
+    through, of_through = jax.lax.map(lambda beam: slopes_of(from_ground, beam), beams)
+    back, of_back = slopes_of(back_to_ground)
+
+    def rows(of_brf: Array, of_through: Array, of_back: Array) -> Array:
+        expand = (slice(None), *(None,) * (of_back.ndim - 1))
+        sun, views = through[0], through[1:][expand]
+        coupling = sun * of_through[1:] + views * of_through[0]
+        return jnp.concatenate([of_brf, coupling, of_back[None]])
+
+    return GroundResponse(brf, through[0] * through[1:], back), jax.tree.map(
+        rows, of_brf, of_through, of_back
+    )

@@ -4,11 +4,16 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..machine.algebra import fenced
 from .column import Column, Options
+from .gradient.emission import radiance
+from .gradient.emitting_mode import Heating
+from .gradient.fluxes import spherical_albedo
 from .gradient.mode_sum import How, ModeSum, mode_sum
+from .lit import seen_from, seen_from_the_view, upside_down, weights_of_modes
 from .method.adding import Emission, Top, emitting_ground
 from .method.azimuth import (
     Directions,
@@ -115,7 +120,58 @@ def plane_albedo(column: Column, options: Options) -> Float[Array, "*batch"]:
     """Share of the sun's light that leaves the top in all directions."""
     problem = _Problem(column, options)
     mean, _ = _grounds(column.albedo, problem)
-    return problem.mean(mean).plane_albedo(problem.one)[0]
+    nothing = jnp.zeros_like(problem.layers.tau), 0.0 * problem.one
+    heating = Heating(*nothing, jnp.full_like(column.mu0, 2))
+    lit = seen_from(0, *problem._shared(), mean, heating)
+    return radiance(lit, problem.doublings, False)
+
+
+def radiance_of_one_view(column: Column, options: Options) -> Float[Array, "*batch"]:
+    """Sunlight and thermal light together, with a derivative that is written out."""
+    problem = _Problem(column, options)
+    mean, others = _grounds(column.albedo, problem)
+    zero = jnp.zeros_like(column.mu0)
+    shine = column.planck_levels, column.surface_emission, column.isotropic_top
+    planck, from_ground, from_above = (zero if x is None else x for x in shine)
+    cold = column.planck_levels is None
+    at_top, at_ground = (zero, zero) if cold else (planck[0], planck[-1])
+    heating = Heating(
+        jumps=jnp.zeros_like(column.tau) if cold else planck[1:] - planck[:-1],
+        ground=emitting_ground(mean, problem.one, from_ground, at_ground).column,
+        above=2 * (from_above - at_top),
+    )
+    assert column.solar_irradiance is not None
+    sun = column.solar_irradiance * column.mu0 / np.pi
+    weights = 0.5 * sun * weights_of_modes(options.num_modes, column.relative_azimuth)
+    lit = seen_from_the_view(*problem._shared(), mean, others, weights, heating)
+    of_modes = radiance(lit, problem.doublings, not options.tms)
+    return at_top + sun * _seen_at_once(problem)[0] + of_modes
+
+
+def over_black_ground(column: Column, options: Options) -> Float[Array, "view *batch"]:
+    """`GroundResponse.brf_black` alone."""
+    problem = _Problem(column, options)
+    ground = black(problem.directions.cosines, options.num_streams)
+    at_once = _seen_at_once(problem)
+    return at_once + 0.5 * problem.reflection(ground, None, at_once)
+
+
+def from_ground(column: Column, options: Options, beam: Any) -> Float[Array, "*batch"]:
+    """Share of isotropic light 1 of a black ground that leaves towards a beam, the sun being 0."""
+    problem = _Problem(column, options)
+    ground = black(problem.directions.cosines, options.num_streams)
+    zero = jnp.zeros_like(column.mu0)
+    emission = emitting_ground(ground, problem.one, zero + 1, zero).column
+    heating = Heating(jnp.zeros_like(problem.layers.tau), emission, zero)
+    lit = seen_from(beam, *problem._shared(), ground, heating)
+    return radiance(lit, problem.doublings, False)
+
+
+def back_to_ground(column: Column, options: Options) -> Float[Array, "*batch"]:
+    """`GroundResponse.spherical_albedo` alone: of the layers in reverse order, from above."""
+    problem = _Problem(column, options)
+    shared = problem.layers, problem.directions, problem.doublings
+    return spherical_albedo(*upside_down(*shared))
 
 
 class _Problem:

@@ -2,8 +2,6 @@
 
 from typing import Unpack
 
-import jax
-import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from .._keywords import with_keywords
@@ -12,6 +10,7 @@ from .door import solve
 from .method.surface import AnySurface
 from .program import emerging
 from .settings import OfReflectances, Settings
+from .views import of_views
 
 
 @with_keywords(OfReflectances, Settings())
@@ -89,22 +88,4 @@ def _brf(tile: Column, options: Options) -> Array:
 
 
 def _view_by_view(tile: Column, options: Options) -> tuple[Array, Column]:
-    """Reflectance of every view, and its slopes, by the derivative of one view (`adjoint`).
-
-    Views share most of a value, but nothing of a gradient, whose light comes from the view.
-    """
-
-    def of_one(view: Array) -> tuple[Array, Column]:
-        def brf(tile: Column) -> Array:
-            phase = tile.phase_function
-            seen = tile._replace(
-                mu=tile.mu[view][None],
-                relative_azimuth=tile.relative_azimuth[view][None],
-                phase_function=None if phase is None else phase[:, view][:, None],
-            )
-            return emerging(seen, options).brf[0]
-
-        value, pull_back = jax.vjp(brf, tile)
-        return value, pull_back(jnp.ones_like(value))[0]
-
-    return jax.lax.map(of_one, jnp.arange(tile.mu.shape[0]))
+    return of_views(lambda seen: emerging(seen, options).brf[0], tile)

@@ -10,8 +10,9 @@ from .._keywords import with_keywords
 from .column import Column, Options, promoted
 from .door import solve
 from .method.surface import AnySurface
-from .program import emerging
+from .program import emerging, radiance_of_one_view
 from .settings import OfViews, Settings
+from .views import of_views
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
 _LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5
@@ -83,7 +84,9 @@ def toa_radiance(
         isotropic_top=None if dark else isotropic_top,
         solar_irradiance=solar_irradiance,
     )
-    return solve(_radiance, _with_harmless_sun(given), Settings(**settings), given=given)
+    how = Settings(**settings)
+    gradient = _view_by_view if how.multiple_views else None
+    return solve(_radiance, _with_harmless_sun(given), how, gradient=gradient, given=given)
 
 
 def _with_harmless_sun(column: Column) -> Column:
@@ -97,7 +100,14 @@ def _with_harmless_sun(column: Column) -> Column:
 
 
 def _radiance(tile: Column, options: Options) -> Array:
-    brf, emitted = emerging(tile, options)
     assert tile.solar_irradiance is not None
+    shine = tile.planck_levels, tile.surface_emission, tile.isotropic_top
+    if tile.mu.shape[0] == 1 and any(x is not None for x in shine):
+        return radiance_of_one_view(tile, options)[None]
+    brf, emitted = emerging(tile, options)
     reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf
     return reflected if emitted is None else reflected + emitted
+
+
+def _view_by_view(tile: Column, options: Options) -> tuple[Array, Column]:
+    return of_views(lambda seen: _radiance(seen, options)[0], tile)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, product, total, transpose
-from ..method.bordered import Bordered
+from ..method.bordered import Bordered, combined
 
 
 class Fields(NamedTuple):
@@ -112,9 +112,14 @@ def swapped(border):
 
 
 @fenced
-def advance(fields: Fields, drop: Fields, h: Float[Array, "*batch"]) -> Fields:
-    """``fields - h drop``."""
-    return Fields(*(x - h * y for x, y in zip(fields, drop, strict=True)))
+def advance(
+    fields: Fields, drop: Fields, h: float | Float[Array, "*batch"], jump: Fields | None = None
+) -> Fields:
+    """``fields - h drop - jump``."""
+    moved = Fields(*(x - h * y for x, y in zip(fields, drop, strict=True)))
+    if jump is None:
+        return moved
+    return Fields(*(x - y for x, y in zip(moved, jump, strict=True)))
 
 
 @fenced
@@ -157,7 +162,10 @@ def _pairs_with_beams(factor, fields, weight, more):
 
 
 def cotangents(
-    mean: Fields, drop: Fields, steps: Sequence[tuple[Action, Float[Array, "*batch"]]]
+    mean: Fields,
+    drop: Fields,
+    steps: Sequence[tuple[Action, Float[Array, "*batch"]]],
+    heat: "Heat | None" = None,
 ) -> tuple[Bordered, Bordered]:
     r"""P and Q of a part of a layer from mean and drop across the layer (`mode`).
 
@@ -167,6 +175,8 @@ def cotangents(
         :math:`\sigma` and N.
     steps
         Quotient R and half thickness h before each doubling that is undone, the last one first.
+    heat
+        Of a layer across which the Planck function changes.
 
     The halves of a doubling see the fields :math:`\sigma - hR\sigma \pm hN/2` and
     :math:`N \pm 2R\sigma`. As pair(x + y) + pair(x - y) = 2 pair(x) + 2 pair(y) under everything
@@ -176,6 +186,10 @@ def cotangents(
     .. math::
        P &= 2^{n+1}\sum [pair(\sigma - hR\sigma) + \tfrac{h^2}{4} pair(N)], \\
        Q &= 2^{n-1}\sum [pair(N) + 4\, pair(R\sigma)].
+
+    With a jump J of the Planck function (`thermal`) the fields change by hN/2 + J/2 from the middle
+    of a half to that of the layer, and of J each half of a half has half as much: this adds
+    :math:`hE` to P.
     """
     means, drops, factor = [mean], [drop], 1.0
     for n, (quotient, h) in enumerate(steps, start=1):
@@ -185,10 +199,30 @@ def cotangents(
         if n == len(steps):
             both = pair(1.0, drops)
             y_bar = pair(2 * factor, means, 0.25 * h * h, both)
+            if heat is not None:
+                y_bar = combined([1.0, h], [y_bar, heat.bar])
             return y_bar, pair(2 * factor, changes, 0.25, both)
-        means += [scaled(0.5 * h, x) for x in drops]
+        halves = [scaled(0.5 * h, x) for x in drops]
+        if heat is not None:
+            halves[0] = advance(halves[0], heat.jump, -1 / factor)
+        means += halves
         drops += [scaled(2.0, c) for c in changes]
     return pair(2.0, means), pair(0.5, drops)
+
+
+class Heat(NamedTuple):
+    """Jump of the Planck function across a layer, and what it leaves of cotangents (`thermal`).
+
+    Parameters
+    ----------
+    jump
+        J, among the fields: of the sun's, since there thermal light is added to the sun's.
+    bar
+        :math:`E = pair(J, N_v)`, the cotangent of Z - B^-1 but for that over h.
+    """
+
+    jump: Fields
+    bar: Bordered
 
 
 class Side(NamedTuple):

@@ -1,8 +1,6 @@
-r"""Pull-backs of the parts of one layer: doublings, start, inverse, and what A and B are made of.
+"""Pull-backs of the inverse of B and of what A and B are made of.
 
-Cotangents are `Bordered`, with a symmetric core where the next step asks for one. Of the admittance
-Y_e they are P, of the impedance hQ with the half thickness h of that stage, of A and B they are
-`mode`'s over h: nothing is ever divided by h.
+Cotangents are `Bordered`, and over h (`mode`): nothing is ever divided by h.
 """
 
 from typing import NamedTuple
@@ -12,152 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced, kernel_of_product, matmul, product, total, transpose
+from ...machine.algebra import fenced, kernel_of_product, matmul, product, total
 from ..method.bordered import Bordered
 from ..method.layer import ModeKernels
 from ..method.quadrature import double_gauss
-from .fields import (
-    Action,
-    Edge,
-    Feed,
-    Side,
-    both_sides,
-    edge,
-    side,
-    side_of_beams,
-    swapped,
-    symmetric,
-)
-
-
-def undouble(
-    quotient: Action, h: Float[Array, "*batch"], y_bar: Bordered, z_bar: Bordered
-) -> tuple[Bordered, Bordered]:
-    """Cotangents P and Q before a doubling of the layer's half h from those after it."""
-    once = side(quotient, y_bar)
-    z_core = _z_core(z_bar.core, once.core, once.border, quotient.border, quotient.core)
-    y_core = _y_core(h, y_bar.core, once.core, z_core)
-    z_edge, y_edge = _undouble_edges(
-        h, quotient.ratio, once.border, once.diagonal, edge(y_bar), edge(z_bar)
-    )
-    return Bordered(y_core, *y_edge), Bordered(z_core, *z_edge)
-
-
-@fenced
-def _z_core(z_core, core, border, sent, left):
-    return 2 * z_core + 2 * both_sides(core, border, sent, left)
-
-
-@fenced
-def _y_core(h, y_core, once, z_core):
-    return 2 * y_core - 4 * h * symmetric(once) + h * h * z_core
-
-
-def _twice(ratio, border, diagonal, x: Edge):
-    """Edge with a quotient on both sides."""
-    return Edge(ratio * border, ratio * diagonal, ratio[:1] * ratio[1:] * x.corner)
-
-
-def _each(ratio, border, diagonal, x: Edge):
-    """Sum of the edges with a quotient on either side."""
-    return Edge(
-        ratio * x.border + border, ratio * x.diagonal + diagonal, (ratio[:1] + ratio[1:]) * x.corner
-    )
-
-
-@fenced
-def _undouble_edges(h, ratio, border, diagonal, y_bar, z_bar):
-    twice, each = (f(ratio, border, diagonal, y_bar) for f in (_twice, _each))
-    z = Edge(*(2 * q + 2 * t for q, t in zip(z_bar, twice, strict=True)))
-    y = Edge(*(2 * p - 2 * h * e + h * h * q for p, e, q in zip(y_bar, each, z, strict=True)))
-    return z, y
-
-
-def undo_start(
-    inner: Action,
-    by_a: Action,
-    ratio_w: Float[Array, "2 *batch"],
-    fraction: Feed,
-    square: Float[Array, "*batch"],
-    d: float,
-    y_bar: Bordered,
-    z_bar: Bordered,
-) -> tuple[Bordered, Bordered]:
-    """Cotangents of A and of B^-1 over h from P and Q, by V, U, W and the start's d.
-
-    W = U (1/3 - h^2 V / 9), and the two commute: W's products follow from U's by one with V.
-    """
-    u = side(by_a, y_bar)
-    w_core, w_border = _chained(
-        square / 9, inner.core, inner.border, by_a.ratio, u[:2], y_bar.border, y_bar.corner
-    )
-    w_diagonal = side_of_beams(ratio_w, by_a.over, fraction, by_a.middle, edge(y_bar), w_border)
-    w = Side(w_core, w_border, w_diagonal)
-    mixed = _both_sides(w.core, w.border, by_a.border, by_a.core)
-    z_core = _start_z_core(square, z_bar.core, u.core, mixed)
-    z_edge, p_edge = _start_z_edge(
-        square, u[1:], w[1:], by_a.ratio, ratio_w, edge(y_bar), edge(z_bar)
-    )
-    z = Bordered(z_core, *z_edge)
-    v = side(inner, z)
-    twice = _both_sides(v.core, v.border, inner.border, inner.core)
-    a_core, p_core = _start_cores(
-        square, d, y_bar.core, w.core, z.core, v.core, twice, z_bar.core, mixed
-    )
-    a_edge, p_edge = _start_edges(
-        square, d, edge(y_bar), w[1:], ratio_w, edge(z), v[1:], inner.ratio, p_edge
-    )
-    return Bordered(a_core, *a_edge), Bordered(p_core, *p_edge)
-
-
-_both_sides = fenced(both_sides)
-
-
-@fenced
-def _chained(ninth, v, sent_v, ratio_u, with_u, x_border, corner):
-    """Core and border with W on one side from those with U."""
-    core, border = with_u
-    sent = sent_v * ratio_u
-    both = product(v, core) + 0.5 * product(sent, transpose(x_border))
-    driven = product(v, border) + swapped(sent) * corner
-    return core / 3 - ninth * both, border / 3 - ninth * driven
-
-
-@fenced
-def _start_z_core(square, z_core, u, mixed):
-    return z_core + symmetric(square * mixed - u)
-
-
-@fenced
-def _start_z_edge(square, u, w, ratio_u, ratio_w, y_bar, z_bar):
-    border, diagonal = (0.5 * (x * ratio_w + y * ratio_u) for x, y in zip(u, w, strict=True))
-    mixed = Edge(
-        border,
-        diagonal,
-        0.5 * (ratio_u[1:] * ratio_w[:1] + ratio_w[1:] * ratio_u[:1]) * y_bar.corner,
-    )
-    each = _each(ratio_u, u[0], u[1], y_bar)
-    p = Edge(*(q + square * m for q, m in zip(z_bar, mixed, strict=True)))
-    return Edge(*(x - 0.5 * e for x, e in zip(p, each, strict=True))), p
-
-
-@fenced
-def _start_cores(square, d, y, w, z, v, twice, z_bar, mixed):
-    quartic = square * square
-    a = y + square * (z / 3 - w) - quartic / 9 * (2 * v - d * square * twice)
-    return a, z_bar + square * mixed + (5 / 9) * quartic * twice
-
-
-@fenced
-def _start_edges(square, d, y_bar, w, ratio_w, z, v, ratio_v, p_edge):
-    each_w, each_v = _each(ratio_w, w[0], w[1], y_bar), _each(ratio_v, v[0], v[1], z)
-    twice = _twice(ratio_v, v[0], v[1], z)
-    quartic = square * square
-    a = (
-        y + square * (x / 3 - 0.5 * ew) - quartic / 9 * (ev - d * square * t)
-        for y, x, ew, ev, t in zip(y_bar, z, each_w, each_v, twice, strict=True)
-    )
-    return Edge(*a), Edge(*(p + (5 / 9) * quartic * t for p, t in zip(p_edge, twice, strict=True)))
+from .fields import Edge, edge, swapped
 
 
 class MatrixSlopes(NamedTuple):

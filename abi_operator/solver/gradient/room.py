@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import Entry, Rows, as_array, fenced, is_entry
 from ...machine.kernels import one_kernel, small_enough
-from ..method.bordered import Bordered
+from ..method.bordered import Bordered, Vector
 from .fields import Action, Feed
 from .layer import Doubled, Kept, Part
 
@@ -46,6 +46,8 @@ class Keeper:
         Doublings of a layer, at most.
     stacks
         Whether stacks are kept.
+    warm
+        Whether there is thermal light.
     """
 
     def __init__(
@@ -54,10 +56,11 @@ class Keeper:
         num_nodes: int,
         most: int,
         stacks: bool = False,
+        warm: bool = False,
     ):
         self.num_layers, self.num_nodes, self.most = tau.shape[0], num_nodes, most
         self.stacks = stacks
-        self.dtype, self.shapes = tau.dtype, _shapes(num_nodes, tau)
+        self.dtype, self.shapes = tau.dtype, _shapes(num_nodes, tau, warm)
 
     def empty(self) -> Room:
         """Room with nothing of use in it."""
@@ -126,7 +129,7 @@ def _empty(shapes: Any, count: int, first: int) -> Any:
     )
 
 
-def _shapes(num_nodes: int, like: Float[Array, "layer *batch"]) -> Room:
+def _shapes(num_nodes: int, like: Float[Array, "layer *batch"], warm: bool) -> Room:
     """What `climb` keeps of one layer, and of each doubling; and a stack."""
 
     def kept() -> Room:
@@ -138,7 +141,9 @@ def _shapes(num_nodes: int, like: Float[Array, "layer *batch"]) -> Room:
         part, feed = Part(core, border), Feed(border, corner)
         adding = Action(core, border, beams, beams, feed, feed)
         own = Bordered(core, border, beams, corner)
-        return Room(Kept(own, feed, feed, part, part, adding), Doubled(part, feed), own)
+        response = Vector(array(num_nodes), corner) if warm else None
+        kept = Kept(own, feed, feed, part, part, adding, response)
+        return Room(kept, Doubled(part, feed), own)
 
     return jax.eval_shape(kept)
 

@@ -30,11 +30,12 @@ class Emission(eqx.Module):
         The vector e of ``t = -Y (s - 2 B) + e``.
     returned
         What a black ground that emits radiance 1 under cold air gets back with s = 0 at the upper
-        face: the downward irradiance over pi. Without meaning for other grounds.
+        face: the downward irradiance over pi. Without meaning for other grounds; None where nobody
+        asks for it.
     """
 
     column: Vector
-    returned: Float[Array, "*batch"]
+    returned: Float[Array, "*batch"] | None
 
 
 def emitting_ground(
@@ -88,6 +89,8 @@ def add_emitting_layer(
     if jump is not None:
         driving = driving - jump
     column = emission.column - quotient.transposed_action(driving)
+    if emission.returned is None:
+        return _with_own_beams(added), Emission(column, None)
     solved = solve(middle.core, [emission.column.nodes[:, None]])[0].joined()[:, 0]
     returned = emission.returned + h * total(emission.column.nodes * solved)
     return _with_own_beams(added), Emission(column, returned)
@@ -129,15 +132,11 @@ class Top(eqx.Module):
         emerging = emission.column.beams - jnp.sum(self.stack.border * s, axis=0)
         return planck + 0.5 * emerging
 
-    def plane_albedo(self, one: Vector) -> Float[Array, "beam *batch"]:
-        """Share of light from each beam that leaves the top, taken by reciprocity."""
-        s = matmul(self.inverse, one.nodes[:, None])
-        return -jnp.sum(self.stack.border * s, axis=0)
-
     def spherical_albedo(self, emission: Emission) -> Float[Array, "*batch"]:
         """What comes back to the ground of its isotropic radiance 1, seen from below."""
         nodes = emission.column.nodes
         s = matmul(self.inverse, nodes[:, None])[:, 0]
+        assert emission.returned is not None
         return emission.returned + jnp.sum(nodes * s, axis=0)
 
 

@@ -36,12 +36,15 @@ class Quotient(eqx.Module):
         Right diagonal over the middle's.
     over
         1 over the middle's diagonal.
+    responses
+        Inverse of the middle's core times each of the loads that were given.
     """
 
     core: Rows
     border: Rows
     ratio: Float[Array, "beam *batch"]
     over: Float[Array, "beam *batch"]
+    responses: Sequence[Rows] = ()
 
     def transposed_action(self, vector: Vector) -> Vector:
         """``right middle^-1`` applied to a vector without a sun (see `Bordered.__matmul__`)."""
@@ -88,12 +91,16 @@ def minus_and_quotient(
     left: Bordered,
     middle: Bordered,
     right: Bordered,
+    loads: Sequence[Float[Array, "node _ *batch"]] = (),
 ) -> tuple[Bordered, Quotient]:
-    """`minus_quotient`, and the quotient ``middle^-1 right`` that it formed on the way."""
+    """`minus_quotient`, and the quotient ``middle^-1 right`` that it formed on the way.
+
+    It also finds what the middle's core makes of more columns of nodes, the `loads`.
+    """
     over = reciprocal(middle.diagonal)
     ratio, own = _ratios(left, over, right)
     source = _source(right.border, middle.border, ratio)
-    solved, driven = solve(middle.core, [right.core, source])
+    solved, driven, *responses = solve(middle.core, [right.core, source, *loads])
     target = source if left is right else _source(left.border, middle.border, own)
     cores, borders, diagonals, corners = _parts(base)
     passed = (left.corner, right.corner, middle.corner, ratio, own)
@@ -104,7 +111,7 @@ def minus_and_quotient(
         _minus_diagonal(diagonals, factor, left.diagonal, ratio),
         _corner(corners, factor, target, driven.joined(), *passed),
     )
-    return result, Quotient(solved, driven, ratio, over)
+    return result, Quotient(solved, driven, ratio, over, responses)
 
 
 def _parts(base):

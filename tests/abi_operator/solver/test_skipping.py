@@ -14,7 +14,7 @@ from abi_operator.solver.skipping.merging import Solved, handed_back, merged
 
 # Rounding of sums in another order.
 ROUNDING = 1e-13
-LAYERS, STREAMS = 12, 8
+LAYERS, STREAMS = 12, 4
 
 
 @cache

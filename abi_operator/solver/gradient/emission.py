@@ -1,0 +1,260 @@
+r"""The derivative of a radiance that is thermal light, too: one gradient for it and sunlight.
+
+A radiance is one number a view: with the sun's weights c_m and reflections r_m of the modes,
+
+.. math:: L = \sum_m c_m r_m + \tfrac12 (e_v - b_v^T s), \qquad s = (1 + Y)^{-1}(2(I - B) 1 + e),
+
+of the mean's Y and e at the top (`method.adding`), but for the Planck function B at the top, which
+is added outside. So there is one adjoint field a mode for both lights, and in the mean the source
+is that of both together (`emitting_mode`): thermal light costs the gradient a few vectors.
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import Array, Float
+
+from ...machine.kernels import one_kernel
+from ..method.adding import Emission, add_emitting_layer, add_layer, top
+from ..method.azimuth import mode_kernels
+from ..method.bordered import Bordered, Vector
+from ..method.doublings import Doublings
+from ..method.ground import black, isotropic
+from ..method.layer import half_layer, node_functions
+from ..method.mode_layers import Order, read
+from .emitting_mode import (
+    Air,
+    Heating,
+    radiance_at_the_top,
+    slope_of_light_from_above,
+    slopes_of_mode,
+)
+from .mode import Kernels
+from .room import Keeper
+
+_LATER = slice(1, None)  # modes but the mean
+_WHOLE = 2  # nodes up to which all layers of all modes are one kernel
+
+
+class Lit(NamedTuple):
+    r"""All that the radiance towards one view depends on; every array is a variable.
+
+    Parameters
+    ----------
+    air
+        Layers as all modes see them, and by how much light towards the view is attenuated in each.
+    beams
+        Legendre functions at sun and view (`method.azimuth.LegendreTables`), even and odd l + m.
+    ground, grounds
+        Admittance of the ground in mode 0, and in modes 1, 2, ... on the first axis of every leaf;
+        None is black.
+    weights
+        Of each mode's reflection in the sum. [radiance unit]
+    heating
+        Thermal light of the mean.
+    """
+
+    air: Air
+    beams: tuple[Float[Array, "mode 2 degree *batch"], Float[Array, "mode 2 degree *batch"]]
+    ground: Bordered
+    grounds: Bordered | None
+    weights: Float[Array, "mode *batch"]
+    heating: Heating
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(2,))
+def radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[Array, "*batch"]:
+    """Sum over the modes of weight times reflection, and what the mean emits.
+
+    Its derivatives come from its gradient. The rule is linear in the tangents, so that one gradient
+    serves forward and reverse mode, and slopes that nobody asks for are not computed.
+    """
+    value = partial(_radiance, single_scattering=single_scattering)
+    num_nodes = _num_nodes(lit)
+    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(lit, doublings)
+
+
+def _radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[Array, "*batch"]:
+    how = doublings, single_scattering
+    first, others = (jax.tree.map(lambda x, i=i: x[i], _modes(lit)) for i in (0, _LATER))
+    light, one = _of_ground(lit), _one(lit)
+    stack, light = _stacked(lit, first, lit.ground, light, *how)
+    assert light is not None
+    closed, nothing = top(stack), jnp.zeros_like(lit.heating.above)
+    emitted = closed.emerging(light, one, 0.5 * lit.heating.above, nothing)[1]
+    mean = first.weight * closed.reflection()[0] + emitted
+
+    def plus(total, mode):
+        ground = _nothing_below(lit) if mode.ground is None else mode.ground
+        stack, _ = _stacked(lit, mode, ground, None, *how)
+        return total + mode.weight * top(stack).reflection()[0], None
+
+    return jax.lax.scan(plus, mean, others)[0]
+
+
+def _stacked(
+    lit: Lit,
+    mode: "_Mode",
+    ground: Bordered,
+    light: Emission | None,
+    doublings: Doublings,
+    single_scattering: bool,
+) -> tuple[Bordered, Emission | None]:
+    """All layers of a mode on the ground; only the mean has thermal light."""
+
+    def put_on(below, air, jumps, doublings, odd, kernels, one, *number):
+        # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
+        place = number[0] if number else jnp.zeros_like(odd)
+        layer, (stack, light) = air.layers.layer(place, odd), below
+        view_secant = read(air.view_secants, place)
+        a, p = layer.matrices(light is not None, kernels, view_secant[None], single_scattering)
+        own = jax.tree.map(lambda x: read(x, place), doublings)
+        y, z = half_layer(a, p, layer.tau, own)
+        if light is None:
+            return add_layer(stack, y, z, layer.tau), None
+        return add_emitting_layer(stack, light, y, z, layer.tau, read(jumps, place) * (p @ one))
+
+    put_on = one_kernel(put_on, _num_nodes(lit), in_parts=True)
+    shared = lit.air, lit.heating.jumps, doublings, mode.order.odd, _kernels(mode), _one(lit)
+
+    def add(below, *number):
+        return put_on(below, *shared, *number), None
+
+    tau = lit.air.layers.tau
+    numbers = jnp.arange(tau.shape[0], dtype=tau.dtype)
+    if numbers.size == 1:
+        return add((ground, light))[0]
+    return jax.lax.scan(add, (ground, light), numbers, reverse=True)[0]
+
+
+def _of_ground(lit: Lit) -> Emission:
+    """What the ground emits, with a place for the sun among the beams."""
+    nodes, beams = lit.heating.ground.nodes, lit.heating.ground.beams
+    return Emission(Vector(nodes, jnp.concatenate([jnp.zeros_like(beams), beams])), None)
+
+
+@partial(radiance.defjvp, symbolic_zeros=True)
+def _radiance_jvp(single_scattering, primals, tangents):
+    lit, doublings = primals
+    value, gradient = radiance_and_gradient(lit, doublings, single_scattering)
+    change = jnp.zeros_like(value)
+    for slope, tangent in zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents[0]), strict=True):
+        if not isinstance(tangent, SymbolicZero):
+            change = change + jnp.sum(slope * tangent, axis=tuple(range(slope.ndim - value.ndim)))
+    return value, change
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(2,))
+def radiance_and_gradient(
+    lit: Lit, doublings: Doublings, single_scattering: bool
+) -> tuple[Float[Array, "*batch"], Lit]:
+    """`radiance` and its slope in every input.
+
+    Each column's slope is that of its own value. Slopes in the ground's cores are symmetric.
+    `Doublings.most` must be given: there is room for so many.
+    """
+    if doublings.most is None:
+        raise TypeError("slopes need a largest number of doublings.")
+
+    def step(carry, mode):
+        value, slopes, of_mean, room = carry
+        # Thermal light is the same in all azimuths: there is none in any mode but the mean.
+        mean = mode.order.mean
+        jumps, column, above = jax.tree.map(lambda x: mean * x, lit.heating)
+        answers, fields, room, found = slopes_of_mode(
+            lit.air,
+            jumps,
+            doublings,
+            single_scattering,
+            mode.order,
+            _kernels(mode),
+            _ground(lit, mode),
+            column,
+            radiance_at_the_top(above, mode.weight),
+            slopes,
+            room,
+        )
+        reflection, emitted = answers
+        assert found.jumps is not None
+        heating = Heating(found.jumps, found.column, slope_of_light_from_above(fields))
+        of_ground = found.ground if lit.grounds is None else None
+        of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, (of_ground, heating))
+        own = None if lit.grounds is None else found.ground
+        value = value + mode.weight * reflection + emitted
+        return (value, found.air, of_mean, room), (reflection, found.beams, own)
+
+    mean = lit.ground if lit.grounds is None else None, lit.heating
+    nothing = jax.tree.map(jnp.zeros_like, (lit.heating.above, lit.air, mean))
+    space = Keeper(lit.air.layers.tau, _num_nodes(lit), doublings.most, warm=True).empty()
+    carry, rows = jax.lax.scan(step, (*nothing, space), _modes(lit))
+    (value, air, (ground, heating), _), (reflections, beams, grounds) = carry, rows
+    if grounds is not None:
+        ground, grounds = (jax.tree.map(lambda x, i=i: x[i], grounds) for i in (0, _LATER))
+    return value, Lit(air, beams, ground, grounds, reflections, heating)
+
+
+@radiance_and_gradient.defjvp
+def _second_derivative(single_scattering, primals, tangents):
+    lit, doublings = primals
+
+    def written_out(lit):
+        return radiance_and_gradient.fun(lit, doublings.written_out(), single_scattering)
+
+    return jax.jvp(written_out, (lit,), tangents[:1])
+
+
+class _Mode(NamedTuple):
+    """Of one mode; its ground is None where modes but the first see a black one."""
+
+    order: Order
+    weight: Float[Array, "*batch"]
+    ground: Bordered | None
+    nodes: tuple[Array, Array]
+    beams: tuple[Array, Array]
+
+
+def _modes(lit: Lit) -> _Mode:
+    """What differs from mode to mode, on the first axis."""
+    dtype, num_modes = lit.weights.dtype, lit.weights.shape[0]
+    functions = node_functions(2 * _num_nodes(lit), num_modes)
+
+    def nodes(parity: int) -> Array:
+        rows = [functions[m, (m + parity) % 2 :: 2].T for m in range(num_modes)]
+        return jnp.asarray(np.stack(rows), dtype)
+
+    number = jnp.arange(num_modes, dtype=dtype)
+    order = Order(number % 2, (number == 0).astype(dtype))
+    grounds = lit.grounds
+    if grounds is not None:
+        grounds = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), lit.ground, grounds)
+    return _Mode(order, lit.weights, grounds, (nodes(0), nodes(1)), lit.beams)
+
+
+def _ground(lit: Lit, mode: _Mode) -> Bordered:
+    """Ground of a mode of which it is data whether it is the mean."""
+    if mode.ground is not None:
+        return mode.ground
+    is_mean = mode.order.mean > 0
+    return jax.tree.map(lambda x, y: jnp.where(is_mean, x, y), lit.ground, _nothing_below(lit))
+
+
+def _nothing_below(lit: Lit) -> Bordered:
+    return black(jnp.ones_like(lit.ground.diagonal), 2 * _num_nodes(lit))
+
+
+def _kernels(mode: _Mode) -> Kernels:
+    a, b = (mode_kernels(n, v) for n, v in zip(mode.nodes, mode.beams, strict=True))
+    return a, b
+
+
+def _num_nodes(lit: Lit) -> int:
+    return lit.air.layers.moments.shape[1]
+
+
+def _one(lit: Lit) -> Vector:
+    """Isotropic light of radiance 1."""
+    return isotropic(2 * _num_nodes(lit), jnp.ones_like(lit.ground.diagonal))
