@@ -24,7 +24,7 @@ OF_DOUBLINGS = 0.2
 """Share of the budget that a layer's response may be off by."""
 DECAY = 0.15
 """Ratio of neighbouring modes' sizes, to see a small one by chance for what it is."""
-OF_SLOPES = 5e-3
+OF_SLOPES = 2e-3
 """The budget of programs for slopes, at most: a column's slopes keep about 1 % whatever else."""
 THICKEST = 2.0
 """Optical depth on the way down and up of a group of layers of which slopes are wanted. [-]"""
