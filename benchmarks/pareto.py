@@ -23,6 +23,7 @@ import sys
 import time
 from dataclasses import dataclass
 from functools import cached_property, partial
+from pathlib import Path
 
 import jax
 import numpy as np
@@ -252,6 +253,14 @@ def parsed():
     return parser.parse_args()
 
 
+def processor():
+    """Name of the processor, where Linux says it."""
+    path = Path("/proc/cpuinfo")
+    lines = path.read_text().splitlines() if path.exists() else []
+    names = [x.split(":")[1].strip() for x in lines if x.startswith("model name")]
+    return names[0] if names else jax.devices()[0].device_kind
+
+
 def main():
     options = parsed()
     if os.environ != without_settings():  # a plain process has none
@@ -265,7 +274,7 @@ def main():
         sys.exit('Peers are missing: pip install "abi-operator[benchmark]".')
     versions = ", ".join(f"{name} {x}" for name, x in found.items())
     print(f"abi-operator {__version__}, jax {jax.__version__}, {versions}")
-    print(f"{jax.devices()[0].device_kind}, {platform.machine()}, {options.cores} cores, Python")
+    print(f"{processor()}, {platform.machine()}, {options.cores} cores and processes, Python")
     print(f"{sys.version.split()[0]}, NumPy {np.__version__}, float64, {options.columns} columns")
     print(f"in a call of ours, {options.repeats} rounds\n", flush=True)
     report = Report(options)

@@ -15,7 +15,10 @@ from pareto_columns import Columns
 
 from abi_operator.solver import toa_brf, toa_radiance
 
-CAN_SKIP = "error_budget" in inspect.signature(toa_brf).parameters
+# Of each door, by whether it emits.
+CAN_SKIP = tuple(
+    "error_budget" in inspect.signature(door).parameters for door in (toa_brf, toa_radiance)
+)
 
 # Streams, and the error that may be spent beside theirs, by workload and error to be met. Fixed on
 # columns of seeds 100 to 104, none of which is timed. What streams leave there at the 99th
@@ -59,7 +62,8 @@ def parts_of(columns: Columns, num_streams, emission=True):
 
 def _call(part: Part, arguments, options):
     door = toa_radiance if part.emits else toa_brf
-    return door(**arguments, **options)
+    known = options if CAN_SKIP[part.emits] else {"num_streams": options["num_streams"]}
+    return door(**arguments, **known)
 
 
 def value(parts, options):
@@ -94,7 +98,7 @@ def options_of(workload, budget, skipping) -> dict[str, Any]:
     """Options of the solver for an error that is to be met."""
     num_streams, spent = STREAMS[workload][budget]
     options = {"num_streams": num_streams}
-    return options | {"error_budget": spent} if skipping and CAN_SKIP else options
+    return options | {"error_budget": spent} if skipping and any(CAN_SKIP) else options
 
 
 def truth(columns: Columns, emission=True):

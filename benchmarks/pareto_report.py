@@ -60,8 +60,11 @@ class Report:
         )
         print(f"## {workload}\n\n{num_layers} layers, {num_moments} moments for the correction of")
         print(f"others, errors over {judged} columns. Ours, fixed beforehand: {fixed}.")
-        if not ours.CAN_SKIP:
-            print("`toa_brf` has no `error_budget` here: nothing is skipped in (b) and (c) either.")
+        for door, can in zip(("toa_brf", "toa_radiance"), ours.CAN_SKIP, strict=True):
+            if not can:
+                print(
+                    f"`{door}` has no `error_budget` here: it skips nothing in (b) and (c) either."
+                )
         print(flush=True)
 
     def check_truth(self, workload, count, apart):
