@@ -46,9 +46,9 @@ def test_tiles_do_not_show(monkeypatch):
     tiles = []
     map_tiles = batching.map_tiles
 
-    def watched(function, leaves, width):
+    def watched(function, leaves, width, need):
         tiles.append((leaves[0].shape[-1], width))
-        return map_tiles(function, leaves, width)
+        return map_tiles(function, leaves, width, need)
 
     monkeypatch.setattr(batching, "map_tiles", watched)
     monkeypatch.setattr(sizes, "tile_size", lambda *_: 1)
