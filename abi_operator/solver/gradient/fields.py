@@ -187,9 +187,9 @@ def cotangents(
        P &= 2^{n+1}\sum [pair(\sigma - hR\sigma) + \tfrac{h^2}{4} pair(N)], \\
        Q &= 2^{n-1}\sum [pair(N) + 4\, pair(R\sigma)].
 
-    With a jump J of the Planck function (`thermal`) the fields change by hN/2 + J/2 from the middle
-    of a half to that of the layer, and of J each half of a half has half as much: this adds
-    :math:`hE` to P.
+    A jump J of the Planck function (`thermal`) is shared by the halves: where the fields change by
+    hN/2 they change by half of J more, by a quarter at the next doubling, and so on. In all this
+    adds :math:`hE` to P in the last one.
     """
     means, drops, factor = [mean], [drop], 1.0
     for n, (quotient, h) in enumerate(steps, start=1):

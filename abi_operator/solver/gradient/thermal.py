@@ -64,7 +64,7 @@ class Warmth(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What the way up needs besides of a layer before its quotient is known.
+    """What thermal light asks of a layer before its quotient is known, on the way up.
 
     Parameters
     ----------
