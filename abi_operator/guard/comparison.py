@@ -199,7 +199,8 @@ def _beyond(old: np.ndarray, new: np.ndarray, tolerance: np.ndarray) -> np.ndarr
 def _changed(stored: Jacobians, now: Jacobians) -> list[str]:
     changed = []
     for name in sorted(stored.settings.keys() | now.settings.keys()):
-        old, new = stored.settings.get(name, "absent"), now.settings.get(name, "absent")
+        # A setting that is younger than the baseline is None where nobody asks for it.
+        old, new = stored.settings.get(name), now.settings.get(name)
         if old != new:
             changed.append(f"setting {name} is {new}, was {old}.")
     for what, old, new in (
