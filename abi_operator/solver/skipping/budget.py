@@ -57,9 +57,8 @@ def expected(
     .. math:: added + ground + \frac12\frac{t}{(1 + t)(1 + a)}, \qquad
        t = \tfrac34\sum\omega(1-g)\tau, \quad a = \sum(1-\omega)\tau,
 
-    half of what a conservative atmosphere of that depth would send back, less what absorbs. On the
-    columns of `benchmarks/skipping.py` it is 0.2 to 1.7 of the reflectance, 0.6 to 0.9 in the
-    median.
+    half of what a conservative atmosphere of that depth would send back, less what absorbs: seldom
+    more than the reflectance, so that what is allowed as a share of it is seldom too much.
 
     Parameters
     ----------
