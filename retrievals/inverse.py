@@ -8,7 +8,7 @@ whose second part, the prior, may be missing. Nothing here knows smoke.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -21,7 +21,7 @@ from abi_operator import State
 from .diagnostics import averaging_kernel, posterior_covariance
 from .forward import ForwardModel
 from .observation import Observation
-from .state_vector import Prior
+from .prior import Prior
 
 
 class Minimiser(NamedTuple):
@@ -83,26 +83,25 @@ def invert(
     prior: Prior | None = None,
     minimiser: Minimiser = DEFAULT_MINIMISER,
 ) -> Inversion:
-    """Find x at one pixel by Levenberg-Marquardt; never raises for values.
+    """Find x at one pixel; never raises for values.
 
     Parameters
     ----------
     forward
         The forward model.
     observation, state
-        What was measured, and all that is known of the column. A reflectance or state that is not
-        finite ends in an inversion that is not `converged`.
+        What was measured, and all that is known of the column. A state that is not finite ends in
+        an inversion that is not `converged`.
     x_first
         Where to begin. [-]
     prior
-        What is known of x beforehand.
+        What is known of x beforehand, of this pixel.
     minimiser
-        When to end.
+        How, and when to end.
     """
 
     def whitened(x: Float[Array, " x"]) -> Float[Array, " residual"]:
-        departure = forward(x, state) - observation.reflectance_factor
-        measurement = departure / observation.sigma
+        measurement = observation.residual(forward(x, state))
         return measurement if prior is None else jnp.concatenate([measurement, prior.residual(x)])
 
     def linearised(x: Float[Array, " x"], _: None) -> tuple[Array, tuple[Array, Array]]:
@@ -112,9 +111,10 @@ def invert(
         residual, jacobian = _value_and_jacobian(whitened, here)
         return residual + jacobian @ (x - here), (residual, jacobian)
 
+    tolerance = max(minimiser.tolerance, _smallest_tolerance(x_first.dtype))
     solution = optx.least_squares(
         linearised,
-        optx.LevenbergMarquardt(minimiser.tolerance, minimiser.tolerance),
+        optx.LevenbergMarquardt(tolerance, tolerance),
         x_first,
         has_aux=True,
         max_steps=minimiser.max_steps,
@@ -126,8 +126,8 @@ def invert(
     covariance = posterior_covariance(jacobian)
     # A cost known to its last digits only may refuse every further step: that is the end, too.
     step = covariance @ (jacobian.T @ residual)
-    settled = _negligible(step, solution.value, minimiser.tolerance)
-    settled &= _negligible(jacobian @ step, residual, minimiser.tolerance)
+    settled = _negligible(step, solution.value, tolerance)
+    settled &= _negligible(jacobian @ step, residual, tolerance)
     return Inversion(
         x=solution.value,
         covariance=covariance,
@@ -137,6 +137,11 @@ def invert(
         num_steps=jnp.asarray(solution.stats["num_steps"]),
         converged=(solution.result == optx.RESULTS.successful) | settled,
     )
+
+
+def _smallest_tolerance(dtype: Any) -> float:
+    """What rounding leaves of a reflectance factor, beside its noise: no step is smaller. [-]"""
+    return 1e4 * float(jnp.finfo(dtype).eps)
 
 
 def _negligible(change: Array, of: Array, tolerance: float) -> Array:

@@ -4,39 +4,32 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import NamedTuple
 
+import jax
 import numpy as np
 import xarray as xr
-from jaxtyping import Array
 
-from abi_operator import __version__
+from abi_operator import State, __version__
+from abi_operator.machine.speed import Kept
 
+from .chunks import map_chunks
 from .pixels import Retrieved
-from .quality import aod_550_sigma
-from .results import flag_attributes
+from .quality import sigmas
+from .results import ResultCode, flag_attributes
 from .state_vector import StateVector
 
 
-class _Variable(NamedTuple):
-    by_band: bool
+class Field(NamedTuple):
+    """A variable of the pixels retrieved: (pixel,), or (band, pixel)."""
+
+    values: np.ndarray
+    units: str
     long_name: str
-    dtype: type = np.float64
-
-
-_VARIABLES = {
-    "aod_550": _Variable(False, "retrieved optical depth of the plume at 550 nm"),
-    "aod_550_sigma": _Variable(False, "posterior standard deviation of aod_550"),
-    "ssa": _Variable(True, "retrieved single-scattering albedo of the plume"),
-    "ssa_sigma": _Variable(True, "posterior standard deviation of ssa"),
-    "degrees_of_freedom": _Variable(False, "degrees of freedom for signal"),
-    "cost": _Variable(False, "sum of squared whitened residuals at the solution"),
-    "num_steps": _Variable(False, "evaluations of the forward model, 0 where none", np.int16),
-}
 
 
 def pixel_fields(
-    vector: StateVector, retrieved: Retrieved, ssa: Mapping[str, Array]
-) -> dict[str, np.ndarray]:
-    """Physical quantities of the pixels retrieved, (pixel,) or (band, pixel).
+    vector: StateVector, retrieved: Retrieved, states: State, num_values: np.ndarray
+) -> dict[str, Field]:
+    """Physical quantities of the pixels retrieved.
 
     Parameters
     ----------
@@ -44,30 +37,64 @@ def pixel_fields(
         Meaning of x.
     retrieved
         Solutions.
-    ssa
-        By band, the single-scattering albedo of each pixel at which x[1] = 0. [-]
+    states
+        What was known of the pixels.
+    num_values
+        Number of measurements of each pixel.
     """
-    inversion = retrieved.inversion
-    fields = {
-        "aod_550": vector.aod_550(inversion.x),
-        "aod_550_sigma": aod_550_sigma(vector, inversion),
-        "degrees_of_freedom": np.trace(inversion.averaging_kernel, axis1=-2, axis2=-1),
-        "cost": inversion.cost,
-        "num_steps": inversion.num_steps,
-    }
-    if vector.retrieve_ssa:
-        sigma = np.sqrt(inversion.covariance[:, 1, 1])
-        fields["ssa"] = [vector.ssa(inversion.x, reference) for reference in ssa.values()]
-        slopes = [vector.ssa_slope(inversion.x, reference) for reference in ssa.values()]
-        fields["ssa_sigma"] = np.stack(slopes) * sigma
-    return {name: np.asarray(values) for name, values in fields.items()}
+    inversion, fields = retrieved.inversion, {}
+    errors = sigmas(vector, inversion)
+    values, others = vector.values(inversion.x), vector.values(retrieved.other.x)
+    several = retrieved.codes == ResultCode.MULTIPLE_SOLUTIONS
+    for i, quantity in enumerate(vector.quantities):
+        name, words = quantity.name, quantity.long_name
+        fields[name] = Field(np.asarray(values[name]), quantity.units, f"retrieved {words}")
+        fields[f"{name}_sigma"] = Field(errors[:, i], quantity.units, _posterior(name))
+        second = np.where(several, others[name], np.nan)
+        fields[f"{name}_second"] = Field(
+            second, quantity.units, f"{name} of the second solution where there are multiple ones"
+        )
+    if vector.derived:
+        reported = map_chunks(
+            lambda *chunk: _report_chunk(vector, *chunk), inversion.x, states, inversion.covariance
+        )
+        for item in vector.derived:
+            for name, words in (
+                (item.name, f"retrieved {item.long_name}"),
+                (f"{item.name}_sigma", _posterior(item.name)),
+            ):
+                found = reported[name]
+                by_band = np.stack(list(found.values())) if isinstance(found, dict) else found
+                fields[name] = Field(by_band, item.units, words)
+    freedom = np.trace(inversion.averaging_kernel, axis1=-2, axis2=-1)
+    cost = "sum of squared whitened residuals at the solution"
+    fields["degrees_of_freedom"] = Field(freedom, "1", "degrees of freedom for signal")
+    fields["cost"] = Field(np.asarray(inversion.cost), "1", cost)
+    for name, words in (("measurement_cost", "measurements"), ("prior_cost", "the prior")):
+        fields[name] = Field(np.asarray(getattr(inversion, name)), "1", f"{cost}, of {words}")
+    counted = "measurements that count, neither missing nor saturated"
+    fields["num_values"] = Field(num_values.astype(np.int16), "1", counted)
+    steps = np.asarray(inversion.num_steps).astype(np.int16)
+    fields["num_steps"] = Field(steps, "1", "evaluations of the forward model, 0 where none")
+    return fields
+
+
+def _posterior(name: str) -> str:
+    return f"posterior standard deviation of {name}"
+
+
+@Kept
+def _report_chunk(
+    vector: StateVector, x: jax.Array, states: State, covariance: jax.Array
+) -> dict[str, jax.Array | dict[str, jax.Array]]:
+    return jax.vmap(vector.report)(x, states, covariance)
 
 
 def make_product(
     dataset: xr.Dataset,
     codes: np.ndarray,
     attempted: np.ndarray,
-    fields: Mapping[str, np.ndarray],
+    fields: Mapping[str, Field],
     bands: tuple[str, ...],
     attributes: Mapping[str, str | int | float],
 ) -> xr.Dataset:
@@ -87,13 +114,18 @@ def make_product(
         Global attributes: how the retrieval was made.
     """
     images = {}
-    for name, values in fields.items():
-        variable = _VARIABLES[name]
-        empty = np.nan if variable.dtype is np.float64 else 0
-        image = np.full(values.shape[:-1] + codes.shape, empty, variable.dtype)
-        image[..., attempted] = values
-        dims = ("band", "time", "y", "x") if variable.by_band else ("time", "y", "x")
-        cf = {"units": "1", "long_name": variable.long_name, "ancillary_variables": "result_code"}
+    for name, field in fields.items():
+        floating = np.issubdtype(field.values.dtype, np.floating)
+        image = np.full(
+            field.values.shape[:-1] + codes.shape, np.nan if floating else 0, field.values.dtype
+        )
+        image[..., attempted] = field.values
+        dims = ("band", "time", "y", "x") if field.values.ndim > 1 else ("time", "y", "x")
+        cf = {
+            "units": field.units,
+            "long_name": field.long_name,
+            "ancillary_variables": "result_code",
+        }
         images[name] = xr.DataArray(image, dims=dims, attrs=cf)
     about = {"long_name": "what became of the retrieval", **flag_attributes()}
     images["result_code"] = xr.DataArray(codes, dims=("time", "y", "x"), attrs=about)
@@ -107,7 +139,6 @@ def make_product(
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     about_file = {
         "Conventions": "CF-1.11",
-        "title": "Smoke retrieved from synthetic imagery",
         "source": f"retrievals of abi_operator {__version__}",
         "history": f"{now} retrieved by abi_operator {__version__}",
     }

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from retrievals.chunks import map_chunks
-from retrievals.first_guess import SCANNED_AOD_550, candidates, guesses
+from retrievals.declarations import SCANNED_AOD_550
+from retrievals.first_guess import candidates, guesses
 from retrievals.pixels import _scan_chunk  # the program of all retrievals
 
 DARK = 0  # row of a scene
@@ -34,7 +35,7 @@ def test_plateaus_and_nothing_but_nan_give_one_candidate_each():
 def test_the_scan_is_lowest_beside_the_truth(columns, forward):
     observation, states, truth = columns
     dark = DARK * 4 + 1  # optical depth 0.3
-    cost = map_chunks(partial(_scan_chunk, forward), observation, states)[dark]
+    cost = map_chunks(partial(_scan_chunk, forward), observation, states)[0][dark]
     assert np.asarray(SCANNED_AOD_550)[np.argmin(cost)] == 0.35
-    assert guesses(forward).shape == (len(SCANNED_AOD_550), 1)
+    assert guesses(forward.vector).shape == (len(SCANNED_AOD_550), 1)
     assert truth[dark] == 0.3

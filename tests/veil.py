@@ -1,0 +1,36 @@
+"""A forward model of retrievals that costs nothing, and pixels of it."""
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from retrievals import StateVector, measurement
+from retrievals.declarations import plume
+from retrievals.smoke import BANDS
+
+
+@dataclass(frozen=True)
+class Veil:
+    """Smoke that hides the ground it is mixed with.
+
+    The state is the reflectance of the ground, by band.
+    """
+
+    vector: StateVector = plume("smoke")  # noqa: RUF009
+    bands: tuple[str, ...] = BANDS
+
+    def __call__(self, x, state):
+        aod_550 = self.vector.values(x)["aod_550"][..., None]
+        transmittance = jnp.exp(-aod_550 * jnp.array([1.4, 0.7, 0.3], x.dtype))
+        return state * transmittance + (1 - transmittance) * jnp.array([0.35, 0.4, 0.3], x.dtype)
+
+
+VEIL = Veil()
+
+
+def veiled_pixels():
+    """Observations, states and true optical depths of pixels under a veil."""
+    ground, truth = np.linspace(0.02, 0.2, 12)[:, None] * np.ones(3), np.geomspace(0.05, 2, 12)
+    seen = np.asarray(VEIL(VEIL.vector.x(truth), jnp.asarray(ground)))
+    return measurement(seen, BANDS), ground, truth
