@@ -73,7 +73,7 @@ def ssa_shift(species: str) -> Quantity:
         logit_shifted,
         sigma=0.7,
         mean=0.0,
-        starts=(-0.4,),
+        starts=(-0.8, 0.8),
     )
 
 

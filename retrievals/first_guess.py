@@ -37,9 +37,9 @@ def guesses(vector: StateVector, state: State | None = None) -> Float[Array, "gu
     return vector.x(*values)
 
 
-def num_starts(vector: StateVector) -> int:
-    """Number of guesses of the first quantity."""
-    return max(1, len(vector.quantities[0].starts))
+def grid(vector: StateVector) -> tuple[int, ...]:
+    """Number of guesses of each quantity."""
+    return tuple(max(1, len(quantity.starts)) for quantity in vector.quantities)
 
 
 def scan(
@@ -55,32 +55,53 @@ def scan(
 
 
 def candidates(
-    cost: Float[np.ndarray, "pixel guess"], num_first: int | None = None
+    cost: Float[np.ndarray, "pixel guess"], shape: tuple[int, ...], num_starts: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pixel and guess of the lowest and, where there is another, second lowest minimum.
+    """Guesses of each pixel from which to begin, the most promising first.
 
-    The lowest of every pixel come first, in the order of pixels.
+    The first is the lowest. The second is the second lowest minimum along the first quantity, of
+    whose values the best guess of the others counts. After them, and in place of a second minimum
+    that is not there, comes the lowest of those that are no neighbours of the ones before: two
+    steps away along some quantity, as long as there are such.
 
     Parameters
     ----------
     cost
         Of every guess.
-    num_first
-        Number of guesses of the first quantity; of those of the others the best counts. None where
-        there is no other.
+    shape
+        Number of guesses of each quantity.
+    num_starts
+        How many are wanted.
+
+    Returns
+    -------
+    Guesses (pixel, start), and which pixels have a second minimum.
     """
     cost = np.nan_to_num(cost, nan=np.inf)
-    by_first = cost.reshape(len(cost), num_first or cost.shape[1], -1)
+    num_guesses = cost.shape[1]
+    rank = np.argsort(np.argsort(cost, axis=1), axis=1)
+    where = np.stack(np.unravel_index(np.arange(num_guesses), shape))
+    apart = np.abs(where[:, :, None] - where[:, None, :]).max(axis=0)
+    second, several = _second_minimum(cost, shape)
+    chosen = [np.argmin(cost, axis=1)]
+    for k in range(1, min(num_starts, num_guesses)):
+        nearest = np.min([apart[guess] for guess in chosen], axis=0)
+        # Neighbours come last, and what is chosen already never.
+        key = rank + num_guesses * np.maximum(2 - nearest, 0)
+        found = np.argmin(key, axis=1)
+        chosen.append(np.where(several, second, found) if k == 1 else found)
+    return np.stack(chosen, axis=1), several
+
+
+def _second_minimum(cost: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Guess at the second lowest minimum along the first quantity, and where there is one."""
+    by_first = cost.reshape(len(cost), shape[0], -1)
     others = np.argmin(by_first, axis=2)
-    cost = np.min(by_first, axis=2)
+    profile = np.min(by_first, axis=2)
     beyond = np.full((len(cost), 1), np.inf)
-    padded = np.concatenate([beyond, cost, beyond], axis=1)
-    minimal = (cost < padded[:, :-2]) & (cost <= padded[:, 2:])
-    best = np.argmin(cost, axis=1)
+    padded = np.concatenate([beyond, profile, beyond], axis=1)
+    minimal = (profile < padded[:, :-2]) & (profile <= padded[:, 2:])
     pixels = np.arange(len(cost))
-    minimal[pixels, best] = False
-    second = np.argmin(np.where(minimal, cost, np.inf), axis=1)
-    several = minimal.any(axis=1)
-    pixel = np.concatenate([pixels, pixels[several]])
-    first = np.concatenate([best, second[several]])
-    return pixel, first * by_first.shape[2] + others[pixel, first]
+    minimal[pixels, np.argmin(profile, axis=1)] = False
+    second = np.argmin(np.where(minimal, profile, np.inf), axis=1)
+    return second * by_first.shape[2] + others[pixels, second], minimal.any(axis=1)

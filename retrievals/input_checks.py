@@ -62,7 +62,8 @@ def checked(
         prior.x_prior[unknown] = 0
         codes[unknown] = ResultCode.INVALID_INPUT
     else:
-        codes[present.sum(axis=1) < forward.vector.size] = ResultCode.TOO_FEW_BANDS
+        too_few = observations.num_values < forward.vector.size
+        codes[too_few] = ResultCode.TOO_FEW_BANDS
     wrong = (sigma <= 0) | (np.isnan(sigma) & np.isfinite(measured)) | too_bright
     codes[wrong.any(axis=1) | ~present.any(axis=1)] = ResultCode.INVALID_INPUT
     measured = np.where((codes == ResultCode.SUCCESS)[:, None], measured, np.nan)

@@ -14,18 +14,21 @@ from abi_operator.machine.sizes import chunk_of_pixels
 from abi_operator.machine.speed import Kept
 
 from .chunks import map_chunks, meanwhile
-from .first_guess import candidates, num_starts, scan
+from .first_guess import candidates, grid, scan
 from .forward import ForwardModel
 from .input_checks import checked
 from .inverse import DEFAULT_MINIMISER, Inversion, Minimiser, invert
 from .observation import Observation
 from .prior import Prior
-from .quality import result_codes
+from .quality import result_codes, same_solution
 from .results import ResultCode
 
 ROUND_STEPS = 8
 """Steps after which the pixels that need more of them continue together, in chunks of their own: a
 chunk lasts as long as its slowest pixel."""
+
+
+_UNSOLVED = (ResultCode.NOT_CONVERGED, ResultCode.NONFINITE, ResultCode.POOR_FIT)
 
 
 class Retrieved(NamedTuple):
@@ -69,24 +72,44 @@ def retrieve_pixels(
         Where there are no pixels, measurements are not of the bands, are in percent, or the prior
         is none of this state vector.
     """
+    minimiser = minimiser.chosen(prior is not None)
     codes, observations, prior = checked(forward, observations, prior)
-    starts_of = partial(_scan_chunk, forward)
     how = _in_rounds(forward, minimiser)
-    first = _first_chunk(forward.vector.size, observations, states, prior)
-    with meanwhile(partial(_invert_chunk.prepare, how, *first)):
-        cost, starts = map_chunks(starts_of, observations, states)
-    pixel, guess = candidates(cost, num_starts(forward.vector))
-    order = np.lexsort((pixel, guess))  # chunks of similar pixels, which take as many steps
-    rows = pixel[order]
-    inputs = jax.tree.map(lambda x: np.asarray(x)[rows], (prior, observations, states))
-    solutions = _minimise(
-        partial(_invert_chunk, how), minimiser, inputs, starts[rows, guess[order]]
-    )
-    solutions = jax.tree.map(lambda x: x[np.argsort(order)], solutions)
-    best, rival = _ranked(solutions, pixel, len(cost))
-    judged = result_codes(forward.vector, best, rival, observations.num_values, exact=exact)
+    several = np.zeros(len(codes), bool)
+    if minimiser.starts == "prior" and prior is not None:
+        starts, guess = np.asarray(prior.x_prior)[:, None], np.zeros((len(codes), 1), int)
+    else:
+        first = _first_chunk(forward.vector.size, observations, states, prior)
+        with meanwhile(partial(_invert_chunk.prepare, how, *first)):
+            cost, starts = map_chunks(partial(_scan_chunk, forward), observations, states)
+        guess, several = candidates(cost, grid(forward.vector), minimiser.max_starts)
     attempted = codes == ResultCode.SUCCESS
-    return Retrieved(best, np.where(attempted, judged, codes).astype(np.int8), rival)
+    if prior is None:  # as many unknowns as measurements: several solutions may fit exactly
+        determined = observations.num_values <= forward.vector.size
+    else:
+        determined = np.zeros(len(codes), bool)
+
+    def begin(pixel: np.ndarray, guess: np.ndarray) -> Inversion:
+        order = np.lexsort((pixel, guess))  # chunks of similar pixels, which take as many steps
+        rows = pixel[order]
+        inputs = jax.tree.map(lambda x: np.asarray(x)[rows], (prior, observations, states))
+        x_first = starts[rows, guess[order]]
+        solutions = _minimise(partial(_invert_chunk, how), minimiser, inputs, x_first)
+        return jax.tree.map(lambda x: x[np.argsort(order)], solutions)
+
+    def judged(best: Inversion, other: Inversion) -> np.ndarray:
+        return result_codes(forward.vector, best, other, observations.num_values, exact=exact)
+
+    best = begin(np.arange(len(codes)), guess[:, 0])
+    other = best
+    for k in range(1, guess.shape[1]):
+        again = determined | np.isin(judged(best, other), _UNSOLVED)
+        rows = np.flatnonzero(attempted & (again | several if k == 1 else again))
+        if rows.size:
+            found = begin(rows, guess[rows, k])
+            best, other = _ranked(best, other, found, rows)
+    final = np.where(attempted, judged(best, other), codes).astype(np.int8)
+    return Retrieved(best, final, other)
 
 
 def _in_rounds(forward: ForwardModel, minimiser: Minimiser) -> tuple[ForwardModel, Minimiser]:
@@ -153,13 +176,38 @@ def _invert_chunk(
 
 
 def _ranked(
-    solutions: Inversion, pixel: np.ndarray, num_pixels: int
+    best: Inversion, other: Inversion, found: Inversion, rows: np.ndarray
 ) -> tuple[Inversion, Inversion]:
-    """Solution of lower cost and the other one, of every pixel; the same twice if it has one."""
-    first = np.arange(num_pixels)
-    second = first.copy()
-    second[pixel[num_pixels:]] = np.arange(num_pixels, len(pixel))
-    rank = np.where(solutions.converged & np.isfinite(solutions.cost), solutions.cost, np.inf)
-    swap = rank[second] < rank[first]
-    best, rival = np.where(swap, second, first), np.where(swap, first, second)
-    return jax.tree.map(lambda x: x[best], solutions), jax.tree.map(lambda x: x[rival], solutions)
+    """The best solution and another one, after one more was found of some pixels.
+
+    The other is the best of those that are not the same as the first; the first once more where
+    there is none.
+    """
+
+    def some(solutions: Inversion) -> Inversion:
+        return jax.tree.map(lambda x: x[rows], solutions)
+
+    first, second = some(best), some(other)
+    better = _rank(found) < _rank(first)
+    # What is not the first any more competes with the second.
+    new_first = _either(better, found, first)
+    loser = _either(better, first, found)
+    vacant = same_solution(second, first) | same_solution(second, new_first)
+    taken = ~same_solution(loser, new_first) & (vacant | (_rank(loser) < _rank(second)))
+    kept = _either(vacant, new_first, second)
+    new_second = _either(taken, loser, kept)
+    put = partial(_with_rows, rows)
+    return jax.tree.map(put, best, new_first), jax.tree.map(put, other, new_second)
+
+
+def _rank(solutions: Inversion) -> np.ndarray:
+    """Cost of what has converged, and no other."""
+    fine = solutions.converged & np.isfinite(solutions.cost)
+    return np.where(fine, solutions.cost, np.inf)
+
+
+def _either(choice: np.ndarray, one: Inversion, two: Inversion) -> Inversion:
+    """Rows of one where chosen, and of the other elsewhere."""
+    return jax.tree.map(
+        lambda a, b: np.where(choice.reshape(-1, *[1] * (a.ndim - 1)), a, b), one, two
+    )

@@ -25,6 +25,12 @@ def sigmas(vector: StateVector, inversion: Inversion) -> np.ndarray:
     return np.asarray(vector.slopes(inversion.x)) * np.sqrt(variance)
 
 
+def same_solution(one: Inversion, two: Inversion) -> np.ndarray:
+    """Whether two solutions of each pixel are one, to what a minimisation leaves."""
+    apart = np.abs(np.asarray(one.x) - np.asarray(two.x))
+    return np.asarray(~(apart > _SAME_X).any(axis=-1))
+
+
 def result_codes(
     vector: StateVector,
     best: Inversion,

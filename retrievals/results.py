@@ -56,7 +56,8 @@ _MESSAGES = {
         "band or a prior."
     ),
     ResultCode.TOO_FEW_BANDS: (
-        "Not attempted: fewer bands are measured here than there are unknowns; give a prior."
+        "Not attempted: fewer bands have values here, neither missing nor saturated, than there "
+        "are unknowns; give a prior."
     ),
 }
 

@@ -21,15 +21,24 @@ def test_the_two_lowest_minima_are_candidates():
             [np.nan, 5.0, 4.0, 3.0, 2.0],
         ]
     )
-    pixel, guess = candidates(cost)
-    np.testing.assert_array_equal(pixel, [0, 1, 2, 3, 1, 2])
-    np.testing.assert_array_equal(guess, [2, 2, 2, 4, 0, 4])
+    guess, several = candidates(cost, (5,), 2)
+    np.testing.assert_array_equal(several, [False, True, True, False])
+    np.testing.assert_array_equal(guess[:, 0], [2, 2, 2, 4])
+    np.testing.assert_array_equal(guess[several, 1], [0, 4])
 
 
 def test_plateaus_and_nothing_but_nan_give_one_candidate_each():
-    pixel, guess = candidates(np.array([[1.0, 1.0, 2.0], [np.nan] * 3]))
-    np.testing.assert_array_equal(pixel, [0, 1])
-    assert guess[0] == 0
+    guess, several = candidates(np.array([[1.0, 1.0, 2.0], [np.nan] * 3]), (3,), 2)
+    assert guess[0, 0] == 0 and not several.any()
+
+
+def test_further_starts_are_no_neighbours_while_there_are_others():
+    """Two quantities of 3 and 2 guesses: the lowest of the second counts along the first."""
+    cost = np.array([[3.0, 1.0, 2.0, 4.0, 6.0, 5.0]])
+    guess, several = candidates(cost, (3, 2), 6)
+    np.testing.assert_array_equal(guess[0, :2], [1, 5])
+    assert sorted(guess[0]) == list(range(6)) and not several.any()
+    assert candidates(cost, (6, 1), 1)[0].shape == (1, 1)
 
 
 def test_the_scan_is_lowest_beside_the_truth(columns, forward):

@@ -1,6 +1,6 @@
 """One pixel, and many at once."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from veil import VEIL, veiled_pixels
 
-from retrievals.inverse import Minimiser, invert
+from retrievals import Quantity, StateVector, Unbounded, measurement
+from retrievals.inverse import SOLVERS, Minimiser, invert
 from retrievals.pixels import retrieve_pixels
 from retrievals.prior import Prior
+from retrievals.quantities import replaced
 from retrievals.results import ResultCode
 from retrievals.smoke import BANDS
 
@@ -125,3 +127,57 @@ def test_a_solution_can_be_mapped_over_starts(veiled, solve):
     found = VEIL.vector.values(solutions.x)["aod_550"]
     np.testing.assert_allclose(found, truth[4], atol=CONVERGED)
     assert len(BANDS) == observation.sigma.shape[1]
+
+
+def test_every_solver_leads_to_the_same_minimum(veiled):
+    observation, states, truth = veiled
+    prior = Prior(np.asarray(VEIL.vector.x(np.full(12, 0.3))), np.eye(1))
+    tight = Minimiser(1e-8, 200, "levenberg_marquardt")
+    expected = retrieve_pixels(VEIL, observation, states, prior=prior, minimiser=tight)
+    assert expected.inversion.converged.all()
+    sigma = np.sqrt(expected.inversion.covariance[:, 0, 0])
+    for solver in SOLVERS:
+        how = Minimiser(None, 40, solver, "prior")
+        found = retrieve_pixels(VEIL, observation, states, prior=prior, minimiser=how)
+        assert found.inversion.converged.all()
+        departure = (found.inversion.x - expected.inversion.x)[:, 0] / sigma
+        assert np.abs(departure).max() < 0.02, solver
+
+
+def test_what_cannot_be_asked_of_a_minimiser_is_said(veiled):
+    observation, states, _ = veiled
+    for how, words in (
+        (Minimiser(solver="newton"), "no solver 'newton'; choose from dogleg"),
+        (Minimiser(starts="prior"), "starts must be 'scan', or with a prior 'prior'"),
+        (Minimiser(tolerance=0.0), "tolerance must be above 0"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            retrieve_pixels(VEIL, observation, states, minimiser=how)
+
+
+NUMBER = Quantity(
+    "q", "1", "a number", "q", Unbounded(), replaced, sigma=1.0, mean=0.0, starts=(-3.0, 0.5, 2.0)
+)
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """A forward model with two solutions: x and -x."""
+
+    vector: StateVector = StateVector((NUMBER,))
+    bands: tuple[str, ...] = ("C01",)
+
+    def __call__(self, x, state):
+        return 0.1 * x**2 + state
+
+
+def test_both_of_two_solutions_are_given():
+    truth = np.array([0.5, 1.0, 2.0])
+    seen = measurement(0.1 * truth[:, None] ** 2, ("C01",))
+    found = retrieve_pixels(Parabola(), seen, np.zeros((3, 1)), exact=True)
+    assert set(found.codes) == {ResultCode.MULTIPLE_SOLUTIONS}
+    both = np.sort(np.concatenate([found.inversion.x, found.other.x], axis=1), axis=1)
+    np.testing.assert_allclose(both, np.stack([-truth, truth], axis=1), atol=CONVERGED)
+    nothing = Prior(truth[:, None], np.full((1, 1), 0.01))
+    alone = retrieve_pixels(Parabola(), seen, np.zeros((3, 1)), prior=nothing)
+    assert set(alone.codes) == {ResultCode.SUCCESS}
