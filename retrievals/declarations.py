@@ -4,6 +4,7 @@ Each is a list of `Quantity`; one of your own is another list. Priors are wide, 
 by what is known of a scene (`StateVector.prior`, or the command's ``--prior``).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import equinox as eqx
@@ -216,6 +217,41 @@ def fire() -> StateVector:
         starts=(3e-4, 3e-3, 3e-2),
     )
     return StateVector((temperature, fraction))
+
+
+def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:
+    """What a retrieval of a plume assumes, and how well that may be known.
+
+    Albedo of the ground in each band, to 0.01; height of the plume, to 500 m; its asymmetry factor,
+    to a shift of the logit of 0.1, which is 0.023 at 0.65. A `MiePlume` has no asymmetry factor.
+    """
+    height = Quantity(
+        "height_shift",
+        "m",
+        f"shift of the height of the {species} plume",
+        f"atmosphere.plumes.{species}",
+        Unbounded(),
+        lifted,
+        sigma=500.0,
+        mean=0.0,
+    )
+    asymmetry = Quantity(
+        "asymmetry_shift",
+        "1",
+        f"shift of the logit of the asymmetry factor of the {species} plume",
+        f"atmosphere.plumes.{species}.asymmetry",
+        Unbounded(),
+        logit_shifted,
+        sigma=0.1,
+        mean=0.0,
+    )
+    return StateVector((*(albedo(band) for band in bands), height, asymmetry))
+
+
+def lifted(plume: Plume | MiePlume, value: Float[Array, "*batch"]) -> Plume | MiePlume:
+    """A plume higher up by a value. [m]"""
+    edges = (plume.base + value, plume.top + value)
+    return eqx.tree_at(lambda p: (p.base, p.top), plume, edges)
 
 
 def with_aod_550(plume: Plume | MiePlume, value: Float[Array, "*batch"]) -> Plume | MiePlume:

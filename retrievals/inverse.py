@@ -157,7 +157,7 @@ def invert(
         # A value whose derivative is the small matrix itself: optimistix carries the linear map
         # from step to step, and would otherwise carry every intermediate of the solver.
         here = jax.lax.stop_gradient(z)
-        residual, jacobian = _value_and_jacobian(whitened, here)
+        residual, jacobian = value_and_jacobian(whitened, here)
         return residual + jacobian @ (z - here), (here, residual, jacobian)
 
     solution = optx.least_squares(
@@ -205,7 +205,7 @@ def _negligible(change: Array, of: Array, tolerance: float) -> Array:
     return jnp.all(jnp.abs(change) < tolerance * (1 + jnp.abs(of)))
 
 
-def _value_and_jacobian(
+def value_and_jacobian(
     function: Callable[[Array], Array], x: Float[Array, " x"]
 ) -> tuple[Float[Array, " residual"], Float[Array, "residual x"]]:
     """Value and forward-mode Jacobian, of which the value is computed once."""
