@@ -15,8 +15,8 @@ of Rodgers (2000) [1]_: with K = dF/dx, measurement noise :math:`S_\epsilon` and
 its covariance :math:`S_b` and the Jacobian :math:`K_b` with respect to it,
 :math:`G K_b S_b K_b^T G^T`. What is assumed is a state vector as well, of other quantities.
 
-Whether any of it holds is asked as in section 5.1: along each principal axis e of :math:`\hat S`, to
-both sides, the forward model departs from its linear form by :math:`\delta = F(\hat x \pm e) -
+Whether any of it holds is asked as in section 5.1: along each principal axis e of :math:`\hat S`,
+to both sides, the forward model departs from its linear form by :math:`\delta = F(\hat x \pm e) -
 F(\hat x) \mp K e`, which noise hides while :math:`\delta^T S_\epsilon^{-1} \delta` is well below 1.
 
 References

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 
-from retrievals import StateVector, measurement
-from retrievals.declarations import plume
+from retrievals import Quantity, StateVector, Unbounded, measurement
+from retrievals.declarations import aod_550, plume
+from retrievals.quantities import replaced
 from retrievals.smoke import BANDS
 
 
@@ -21,12 +22,18 @@ class Veil:
     bands: tuple[str, ...] = BANDS
 
     def __call__(self, x, state):
-        aod_550 = self.vector.values(x)["aod_550"][..., None]
+        values = self.vector.values(x)
+        aod_550 = values["aod_550"][..., None]
+        if "brighter" in values:
+            state = state + values["brighter"][..., None] * jnp.array([0.5, 1.0, 2.0], x.dtype)
         transmittance = jnp.exp(-aod_550 * jnp.array([1.4, 0.7, 0.3], x.dtype))
         return state * transmittance + (1 - transmittance) * jnp.array([0.35, 0.4, 0.3], x.dtype)
 
 
 VEIL = Veil()
+_BRIGHTER = Quantity("brighter", "1", "ground", "", Unbounded(), replaced, sigma=0.05, mean=0.0)
+TWO = Veil(StateVector((aod_550("smoke"), _BRIGHTER)))
+"""The same with the ground's brightness unknown, too."""
 
 
 def veiled_pixels():
