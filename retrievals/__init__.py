@@ -4,7 +4,8 @@ With this package you invert the operator of `abi_operator` by nonlinear least s
 pixel and with its exact derivatives, and score what comes out against the truth. What is retrieved
 is a `StateVector`, a list of `Quantity`: `declarations` has those of smoke, ash, dust, liquid
 cloud, fire and ground, and one of your own is another list. `retrieve_image` inverts the result of
-a simulation, `retrieve_pixels` any measurements (`measurement`) and states; `ForwardModel` and
+a simulation (`retrieve_kind` one of the shipped ones), `retrieve_pixels` any measurements
+(`measurement`) and states, fires among them; `ForwardModel` and
 `invert` are the parts of which both are made; `retrievals.scoring` holds the yardsticks.
 """
 
@@ -14,6 +15,8 @@ from .images import retrieve_image as retrieve_image
 from .inverse import Inversion as Inversion
 from .inverse import Minimiser as Minimiser
 from .inverse import invert as invert
+from .kinds import retrieve_kind as retrieve_kind
+from .kinds import retrieve_smoke as retrieve_smoke
 from .observation import Observation as Observation
 from .observation import measurement as measurement
 from .observation import noise_sigma as noise_sigma
@@ -22,7 +25,6 @@ from .prior import Prior as Prior
 from .quantities import Derived as Derived
 from .quantities import Quantity as Quantity
 from .results import ResultCode as ResultCode
-from .smoke import retrieve_smoke as retrieve_smoke
 from .state_vector import StateVector as StateVector
 from .transforms import Bounded as Bounded
 from .transforms import Unbounded as Unbounded

@@ -179,7 +179,7 @@ def liquid_cloud() -> StateVector:
         with_droplet_radius,
         sigma=1.0,
         mean=10.0,
-        get=_mean_droplet_radius_um,
+        get=mean_droplet_radius_um,
         starts=(6.0, 10.0, 20.0),
     )
     path = Derived("liquid_water_path", "kg m-2", "mass of liquid water", place, _water_path)
@@ -315,10 +315,13 @@ def _with_paths(cloud: LiquidCloud, mass: Array, number: Array) -> LiquidCloud:
     return eqx.tree_at(lambda c: (c.mass_path, c.number_path), cloud, (mass, number))
 
 
-def _mean_droplet_radius_um(cloud: LiquidCloud) -> Float[Array, "*batch"]:
-    """Effective radius of all droplets together: 3 W / (2 rho tau). [um]"""
+def mean_droplet_radius_um(cloud: LiquidCloud) -> Float[Array, "*batch"]:
+    """Effective radius of all droplets together, 3 W / (2 rho tau); NaN without cloud. [um]"""
     path = _water_path(cloud)
-    return 1.5 * path / WATER_DENSITY / optical_thickness(cloud) / _MICRON
+    thickness = optical_thickness(cloud)
+    cloudy = thickness > 0
+    radius = 1.5 * path / WATER_DENSITY / jnp.where(cloudy, thickness, 1) / _MICRON
+    return jnp.where(cloudy, radius, jnp.nan)
 
 
 def _water_path(cloud: LiquidCloud) -> Float[Array, "*batch"]:

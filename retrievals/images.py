@@ -17,9 +17,10 @@ from abi_operator.scene import column_states, gases_of
 from .forward import ForwardModel, prepared
 from .inverse import DEFAULT_MINIMISER, Minimiser
 from .observation import Observation, add_noise, observe, usable
+from .optimal_estimation import estimates
 from .pixels import retrieve_pixels
 from .prior import Prior
-from .product import make_product, pixel_fields
+from .product import diagnostic_fields, make_product, pixel_fields
 from .results import ResultCode
 from .state_vector import StateVector
 
@@ -33,10 +34,12 @@ def retrieve_image(
     *,
     bands: Sequence[str],
     species: str | None = None,
-    where: Literal["plume", "all"] = "plume",
+    where: Literal["plume", "cloud", "all"] = "plume",
     noise: bool = False,
     seed: int = 0,
-    prior: Prior | Literal["declared"] | None = None,
+    prior: Prior | StateVector | None = None,
+    assumed: StateVector | None = None,
+    diagnostics: bool = False,
     num_streams: int | None = None,
     minimiser: Minimiser = DEFAULT_MINIMISER,
     attributes: dict[str, Any] | None = None,
@@ -59,14 +62,19 @@ def retrieve_image(
     species
         Name of the plume that is retrieved, None if none is.
     where
-        ``"plume"``: where the plume's brightness is above 0; ``"all"``: at every usable pixel,
-        where those without plume end as ``not_converged`` unless there is a prior.
+        ``"plume"``: where the plume's brightness is above 0; ``"cloud"``: where there is cloud
+        water; ``"all"``: at every usable pixel, where those without plume end as ``not_converged``
+        unless there is a prior.
     noise, seed
         Whether to add noise (`observation.add_noise`) to the reflectances, and its seed. Without
         noise a fit has to be exact; posterior errors are those that noise would cause.
     prior
-        What is known of x beforehand, of all pixels; ``"declared"`` for what the quantities' own
-        declarations say.
+        What is known of x beforehand, of all pixels; a state vector stands for what its quantities
+        declare (``prior=vector``).
+    assumed
+        What is not retrieved, for the diagnostics: errors due to it, as it is declared.
+    diagnostics
+        Whether to add matrices and errors of `optimal_estimation` to the product.
     num_streams
         Streams of the solver; None for those of the simulation.
     minimiser
@@ -80,7 +88,10 @@ def retrieve_image(
         ``result_code``, which has to be 0 where the rest is used; each quantity of the state
         vector, its posterior standard deviation ``_sigma`` and its value at a second solution
         ``_second``; what is derived of them; ``cost`` and its parts ``measurement_cost`` and
-        ``prior_cost``, ``degrees_of_freedom``, ``num_values`` and ``num_steps``.
+        ``prior_cost``, ``degrees_of_freedom``, ``num_values`` and ``num_steps``. As diagnostics
+        ``averaging_kernel``, ``posterior_covariance`` and ``gain`` of x, ``residual``,
+        ``information_content``, ``nonlinearity``, and of each quantity its ``_noise_error``,
+        ``_smoothing_error`` and ``_error_due_to_`` what is assumed.
 
     Raises
     ------
@@ -105,15 +116,21 @@ def retrieve_image(
             forward = ForwardModel(
                 vector, bands, num_streams, gases=gases_of(dataset), satellite=satellite
             )
+            forward = prepared(forward, states)
+            of_x = prior.prior(states) if isinstance(prior, StateVector) else prior
             retrieved = retrieve_pixels(
-                prepared(forward, states),
+                forward,
                 observations,
                 states,
-                prior=vector.prior(states) if isinstance(prior, str) else prior,
+                prior=of_x,
                 minimiser=minimiser,
                 exact=not noise and prior is None,
             )
             fields = pixel_fields(vector, retrieved, states, observations.num_values)
+            if diagnostics:
+                x = np.asarray(retrieved.inversion.x)
+                found = estimates(forward, observations, states, x, of_x, assumed)
+                fields |= diagnostic_fields(vector, x, found, assumed)
             codes[attempted] = retrieved.codes
     about = {
         "bands": " ".join(bands),
@@ -122,7 +139,8 @@ def retrieve_image(
         "prior": "none" if prior is None else "normal distribution",
     }
     about |= {} if species is None else {"species": species}
-    return make_product(dataset, codes, attempted, fields, bands, about | (attributes or {}))
+    about |= attributes or {}
+    return make_product(dataset, codes, attempted, fields, (bands, vector.names), about)
 
 
 def _check(

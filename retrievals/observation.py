@@ -180,7 +180,10 @@ def observe(columns: xr.Dataset, bands: tuple[str, ...], imager: Imager = IMAGER
 
 
 def usable(
-    image: xr.Dataset, bands: tuple[str, ...], species: str | None, where: Literal["plume", "all"]
+    image: xr.Dataset,
+    bands: tuple[str, ...],
+    species: str | None,
+    where: Literal["plume", "cloud", "all"],
 ) -> np.ndarray:
     """Result code of the pixels that are not to be attempted, 0 (success) elsewhere.
 
@@ -194,7 +197,8 @@ def usable(
         Name of the plume, None if none is retrieved.
     where
         ``"plume"``: only where the specified plume is (its brightness above 0), as if a plume mask
-        had been made beforehand; ``"all"``: everywhere.
+        had been made beforehand; ``"cloud"``: only where there is cloud water; ``"all"``:
+        everywhere.
     """
     codes = np.full((image.sizes["y"], image.sizes["x"]), _ATTEMPTED, np.int8)
     measured = image["reflectance_factor"].sel(band=list(bands)).transpose("band", "y", "x")
@@ -202,4 +206,6 @@ def usable(
     codes[(image["quality_flag"].values & _UNUSABLE) != 0] = ResultCode.UNUSABLE
     if where == "plume" and species is not None:
         codes[~(image[f"{species}_brightness"].values > 0)] = ResultCode.NO_PLUME
+    if where == "cloud":
+        codes[~(image["liquid_mass_path"].sum("layer").values > 0)] = ResultCode.NO_PLUME
     return codes

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
@@ -12,6 +13,7 @@ from abi_operator import State, __version__
 from abi_operator.machine.speed import Kept
 
 from .chunks import map_chunks
+from .optimal_estimation import Estimate
 from .pixels import Retrieved
 from .quality import sigmas
 from .results import ResultCode, flag_attributes
@@ -19,11 +21,12 @@ from .state_vector import StateVector
 
 
 class Field(NamedTuple):
-    """A variable of the pixels retrieved: (pixel,), or (band, pixel)."""
+    """A variable of the pixels retrieved, (*dims, pixel)."""
 
     values: np.ndarray
     units: str
     long_name: str
+    dims: tuple[str, ...] = ()
 
 
 def pixel_fields(
@@ -64,8 +67,11 @@ def pixel_fields(
                 (f"{item.name}_sigma", _posterior(item.name)),
             ):
                 found = reported[name]
-                by_band = np.stack(list(found.values())) if isinstance(found, dict) else found
-                fields[name] = Field(by_band, item.units, words)
+                if isinstance(found, dict):
+                    by_band = np.stack(list(found.values()))
+                    fields[name] = Field(by_band, item.units, words, ("band",))
+                else:
+                    fields[name] = Field(np.asarray(found), item.units, words)
     freedom = np.trace(inversion.averaging_kernel, axis1=-2, axis2=-1)
     cost = "sum of squared whitened residuals at the solution"
     fields["degrees_of_freedom"] = Field(freedom, "1", "degrees of freedom for signal")
@@ -76,6 +82,53 @@ def pixel_fields(
     fields["num_values"] = Field(num_values.astype(np.int16), "1", counted)
     steps = np.asarray(inversion.num_steps).astype(np.int16)
     fields["num_steps"] = Field(steps, "1", "evaluations of the forward model, 0 where none")
+    return fields
+
+
+def diagnostic_fields(
+    vector: StateVector,
+    x: np.ndarray,
+    found: Estimate,
+    assumed: StateVector | None,
+) -> dict[str, Field]:
+    """Diagnostics of the pixels retrieved: matrices of x, and errors in the units of quantities.
+
+    Parameters
+    ----------
+    vector, x
+        Meaning of x, and the solutions.
+    found
+        Their diagnostics.
+    assumed
+        What was assumed, of which there are errors.
+    """
+    square = ("element", "element_2")
+    matrices = {
+        "posterior_covariance": ("posterior covariance of x", square),
+        "averaging_kernel": ("averaging kernel of x", square),
+        "gain": ("gain of x, per measurement", ("element", "band")),
+        "residual": ("whitened departure of the forward model from the measurement", ("band",)),
+    }
+    fields = {
+        name: Field(np.moveaxis(np.asarray(getattr(found, name)), 0, -1), "1", words, dims)
+        for name, (words, dims) in matrices.items()
+    }
+    bits = "information content of the measurement, in bit"
+    fields["information_content"] = Field(np.asarray(found.information_content), "1", bits)
+    departure = "largest departure from a linear forward model within the posterior error"
+    fields["nonlinearity"] = Field(np.asarray(found.nonlinearity), "1", departure)
+    slopes = np.asarray(vector.slopes(jnp.asarray(x)))
+    for i, quantity in enumerate(vector.quantities):
+        name, units = quantity.name, quantity.units
+        for part in ("noise", "smoothing"):
+            variance = getattr(found, f"{part}_covariance")[:, i, i]
+            error = slopes[:, i] * np.sqrt(variance)
+            words = f"standard deviation of {name} due to {part}"
+            fields[f"{name}_{part}_error"] = Field(error, units, words)
+        for j, other in enumerate(() if assumed is None else assumed.quantities):
+            error = slopes[:, i] * found.parameter_error[:, j, i]
+            words = f"standard deviation of {name} due to the {other.long_name}"
+            fields[f"{name}_error_due_to_{other.name}"] = Field(error, units, words)
     return fields
 
 
@@ -95,7 +148,7 @@ def make_product(
     codes: np.ndarray,
     attempted: np.ndarray,
     fields: Mapping[str, Field],
-    bands: tuple[str, ...],
+    names: tuple[tuple[str, ...], tuple[str, ...]],
     attributes: Mapping[str, str | int | float],
 ) -> xr.Dataset:
     """Put pixels back into the image.
@@ -108,8 +161,8 @@ def make_product(
         Result code of every pixel, and which of them `fields` holds; (time, y, x).
     fields
         As `pixel_fields` returns.
-    bands
-        Bands of the fields that have a band.
+    names
+        Of bands, and of the elements of x, for the fields that have them.
     attributes
         Global attributes: how the retrieval was made.
     """
@@ -120,26 +173,28 @@ def make_product(
             field.values.shape[:-1] + codes.shape, np.nan if floating else 0, field.values.dtype
         )
         image[..., attempted] = field.values
-        dims = ("band", "time", "y", "x") if field.values.ndim > 1 else ("time", "y", "x")
         cf = {
             "units": field.units,
             "long_name": field.long_name,
             "ancillary_variables": "result_code",
         }
-        images[name] = xr.DataArray(image, dims=dims, attrs=cf)
+        images[name] = xr.DataArray(image, dims=(*field.dims, "time", "y", "x"), attrs=cf)
     about = {"long_name": "what became of the retrieval", **flag_attributes()}
     images["result_code"] = xr.DataArray(codes, dims=("time", "y", "x"), attrs=about)
     product = xr.Dataset(images)
     if "time" in dataset.dims:
-        product = product.transpose("time", "band", "y", "x", missing_dims="ignore")
+        order = ("time", "element", "element_2", "band", "y", "x")
+        product = product.transpose(*order, missing_dims="ignore")
     else:
         product = product.isel(time=0)
     kept = {name: dataset[name] for name in ("time", "latitude", "longitude") if name in dataset}
-    by_band = {"band": list(bands)} if "band" in product.dims else {}
+    bands, elements = names
+    labels = {"band": bands, "element": elements, "element_2": elements}
+    by_name = {dim: list(values) for dim, values in labels.items() if dim in product.dims}
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     about_file = {
         "Conventions": "CF-1.11",
         "source": f"retrievals of abi_operator {__version__}",
         "history": f"{now} retrieved by abi_operator {__version__}",
     }
-    return product.assign_coords(kept | by_band).assign_attrs(about_file | dict(attributes))
+    return product.assign_coords(kept | by_name).assign_attrs(about_file | dict(attributes))

@@ -7,8 +7,8 @@ import numpy as np
 
 from retrievals import Quantity, StateVector, Unbounded, measurement
 from retrievals.declarations import aod_550, plume
+from retrievals.kinds import BANDS
 from retrievals.quantities import replaced
-from retrievals.smoke import BANDS
 
 
 @dataclass(frozen=True)

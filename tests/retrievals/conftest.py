@@ -9,8 +9,8 @@ from abi_operator.nomenclature import SCENARIO
 from abi_operator.scene import column_states, gases_of, simulate
 from retrievals.declarations import plume as plume_vector
 from retrievals.forward import ForwardModel, prepared
+from retrievals.kinds import BANDS
 from retrievals.observation import observe
-from retrievals.smoke import BANDS
 
 HEIGHT = np.array([60e3, 20e3, 8e3, 3e3, 2e3, 1e3, 500.0, 0.0])
 DARK, BRIGHT, CLOUDY = 0, 1, 2  # rows of a scene: dark ground, bright ground, dark under cloud

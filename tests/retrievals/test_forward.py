@@ -8,8 +8,8 @@ from abi_operator import reflectance_factor
 from abi_operator.scene import column_states, gases_of, simulate
 from retrievals.declarations import plume
 from retrievals.forward import ForwardModel
+from retrievals.kinds import BANDS
 from retrievals.observation import observe
-from retrievals.smoke import BANDS
 
 ROUNDING = 1e-11
 

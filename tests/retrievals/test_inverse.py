@@ -11,11 +11,11 @@ from veil import VEIL, veiled_pixels
 
 from retrievals import Quantity, StateVector, Unbounded, measurement
 from retrievals.inverse import SOLVERS, Minimiser, invert
+from retrievals.kinds import BANDS
 from retrievals.pixels import retrieve_pixels
 from retrievals.prior import Prior
 from retrievals.quantities import replaced
 from retrievals.results import ResultCode
-from retrievals.smoke import BANDS
 
 # What a last step below the tolerance of 1e-6 leaves, times the derivative of optical depth.
 CONVERGED = 1e-8

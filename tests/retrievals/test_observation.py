@@ -9,6 +9,7 @@ import xarray as xr
 from abi_operator.instrument import Imager, observe_mean
 from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.planck import in_band_radiance
+from retrievals.kinds import BANDS
 from retrievals.observation import (
     Observation,
     add_noise,
@@ -18,7 +19,6 @@ from retrievals.observation import (
     usable,
 )
 from retrievals.results import ResultCode
-from retrievals.smoke import BANDS
 
 
 def test_noise_meets_the_requirement_and_the_measured_point():

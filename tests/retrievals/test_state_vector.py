@@ -18,8 +18,8 @@ from abi_operator import (
 from abi_operator.optics import effective_radius, mie_optics
 from retrievals import Bounded, Prior, Quantity, StateVector, Unbounded
 from retrievals.declarations import albedo, aod_550, fire, liquid_cloud, plume
+from retrievals.kinds import BANDS
 from retrievals.quantities import part, replaced, scaled
-from retrievals.smoke import BANDS
 
 AOD_550 = np.array([1e-4, 0.05, 0.7, 3.0, 9.9])
 ROUNDING = 1e-12
