@@ -29,7 +29,9 @@ def random_states(rng, num_pixels, bands, species="smoke", albedo=(0.01, 0.4)):
         top=base + rng.uniform(1e3, 3e3, n),
         extinction_550=np.full(n, 1e-4),
         brightness=np.ones(n),
-        relative_extinction={b: np.full(n, float(s.relative_extinction)) for b, s in spheres.items()},
+        relative_extinction={
+            b: np.full(n, float(s.relative_extinction)) for b, s in spheres.items()
+        },
         ssa={b: np.full(n, float(1 - s.coalbedo)) for b, s in spheres.items()},
         asymmetry={b: np.full(n, float(s.asymmetry)) for b, s in spheres.items()},
     )
