@@ -6,12 +6,14 @@ from typing import Annotated
 import typer
 import xarray as xr
 
-from abi_operator.bands import GRASSO2013, check_bands
+from abi_operator.bands import check_bands
 from abi_operator.commands import one_sentence, typed
 from abi_operator.files import InputError, output_folder, read_result
 
+from .images import REFLECTIVE
+from .kinds import KINDS, retrieve_kind, retrieve_smoke, vector_of
+from .prior_file import read_prior
 from .scoring import format_report, score_retrieval
-from .smoke import BANDS, retrieve_smoke
 
 RETRIEVAL = "retrieval.nc"
 SCORES = "scores.csv"
@@ -19,28 +21,64 @@ SCORES = "scores.csv"
 
 def retrieve(
     context: typer.Context,
+    kind: Annotated[str, typer.Argument(help=f"What to retrieve: {', '.join(KINDS)}.")],
     result: Annotated[
-        Path, typer.Argument(help="result.nc of a simulation with a plume of smoke.")
+        Path, typer.Argument(help="result.nc of a simulation with such a plume, or with cloud.")
     ],
     out: Annotated[Path, typer.Option(help="File to write, NetCDF.")],
-    bands: Annotated[str, typer.Option(help="Bands to retrieve from.")] = ",".join(BANDS),
+    bands: Annotated[
+        str | None,
+        typer.Option(help="Bands to retrieve from; C01,C02,C03 of plumes and C02,C06 of cloud."),
+    ] = None,
     retrieve_ssa: Annotated[
         bool,
         typer.Option(
-            help="Retrieve how much the smoke absorbs, too: its single-scattering albedo."
+            help="Retrieve how much the plume absorbs, too: its single-scattering albedo."
+        ),
+    ] = False,
+    effective_radius: Annotated[
+        bool,
+        typer.Option(
+            help="Retrieve the size of a plume's particles, too, by tables of Mie theory."
         ),
     ] = False,
     noise: Annotated[bool, typer.Option(help="Add the imager's noise first.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            help="What is known before: a TOML file with mean and sigma of [aod_550] and "
+            "others, or 'declared' for wide ones that are built in."
+        ),
+    ] = None,
+    diagnostics: Annotated[
+        bool,
+        typer.Option(help="Write averaging kernels, gains and errors by source, too."),
+    ] = False,
 ) -> None:
-    """Retrieve the optical depth of smoke from a simulated result."""
+    """Retrieve a plume or cloud from a simulated result."""
+    if kind not in KINDS:
+        raise typer.BadParameter(f"cannot retrieve {kind!r}; choose from {', '.join(KINDS)}.")
     try:
-        names = check_bands([name.strip() for name in bands.split(",")], GRASSO2013)
+        chosen = (
+            None
+            if bands is None
+            else check_bands([band.strip() for band in bands.split(",")], REFLECTIVE)
+        )
+        vector = vector_of(kind, retrieve_ssa, effective_radius)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     with one_sentence(), read_result(result) as dataset:
-        retrieval = retrieve_smoke(
-            dataset, bands=names, retrieve_ssa=retrieve_ssa, noise=noise, seed=seed
+        retrieval = retrieve_kind(
+            dataset,
+            kind,
+            bands=chosen,
+            retrieve_ssa=retrieve_ssa,
+            effective_radius=effective_radius,
+            noise=noise,
+            seed=seed,
+            prior=None if prior is None else read_prior(prior, vector),
+            diagnostics=diagnostics,
         )
         # The latest event first, as `history` has it.
         event = f"{retrieval.attrs['history']}: {typed(context)}"

@@ -9,9 +9,9 @@ References
    sections 2.3, 2.4 and 12.3, doi:10.1142/3171
 """
 
-import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy
 from jaxtyping import Array, Float
 
 
@@ -33,7 +33,9 @@ def averaging_kernel(
     return covariance @ measurement_jacobian.T @ measurement_jacobian
 
 
-def probability_of_cost(cost: Float[Array, " pixel"], degrees_of_freedom: int) -> np.ndarray:
+def probability_of_cost(
+    cost: Float[Array | np.ndarray, " pixel"], degrees_of_freedom: int | np.ndarray
+) -> np.ndarray:
     """Probability that noise alone makes a minimum cost as large as this, or larger. [-]
 
     Parameters
@@ -43,5 +45,4 @@ def probability_of_cost(cost: Float[Array, " pixel"], degrees_of_freedom: int) -
     degrees_of_freedom
         Residuals minus unknowns, 1 or more. [-]
     """
-    half = jnp.asarray(degrees_of_freedom / 2, cost.dtype)
-    return np.asarray(jax.scipy.special.gammaincc(half, jnp.asarray(cost / 2)))
+    return scipy.special.gammaincc(np.asarray(degrees_of_freedom) / 2, np.asarray(cost) / 2)

@@ -1,15 +1,16 @@
-"""The forward model of a retrieval: state vector in, reflectance factors out."""
+"""The forward model of a retrieval: state vector in, what the imager would measure out."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from abi_operator import BANDS, Atmosphere, Plume, State, reflectance_factor
+from abi_operator import BANDS, Atmosphere, State, radiance, reflectance_factor
+from abi_operator.instrument import reflectance_factor_from_radiance
 from abi_operator.machine.sizes import chunk_of_pixels_to_read
 from abi_operator.machine.speed import Kept
 from abi_operator.optics import ALL_GASES, column_optics
@@ -18,9 +19,13 @@ from abi_operator.solver import sufficient_doublings
 from .chunks import map_chunks
 from .state_vector import StateVector
 
+THERMAL = "C07"
+"""The band that is measured as radiance, as files hold it; the others are reflectance factors."""
 
-class ForwardModel(eqx.Module):
-    """Reflectance factors of one column whose plume is given by x and everything else by a state.
+
+@dataclass(frozen=True)
+class ForwardModel:
+    """What is measured of one column, of which x gives a part and a state everything else.
 
     Parameters
     ----------
@@ -29,48 +34,51 @@ class ForwardModel(eqx.Module):
     bands
         Bands that are measured.
     num_streams, num_doublings
-        Settings of the solver; see `abi_operator.brf`. The doublings must suffice up to
-        ``vector.aod_limit``, which `prepared` takes care of.
-    species
-        Name of the plume that is retrieved.
+        Settings of the solver; see `abi_operator.brf`. The doublings must suffice for every x,
+        which `prepared` takes care of.
     gases
         Gases of the state that absorb.
+    satellite
+        Whose response and solar irradiance; the sun is at 1 AU, which the radiance of C07 tells.
     """
 
     vector: StateVector
-    bands: tuple[str, ...] = eqx.field(static=True)
-    num_streams: int = eqx.field(static=True, default=8)
-    num_doublings: int | None = eqx.field(static=True, default=None)
-    species: str = eqx.field(static=True, default="smoke")
-    gases: tuple[str, ...] = eqx.field(static=True, default=ALL_GASES)
+    bands: tuple[str, ...]
+    num_streams: int = 8
+    num_doublings: int | None = None
+    gases: tuple[str, ...] = ALL_GASES
+    satellite: str = "GOES-16"
 
     def state(self, x: Float[Array, "*batch x"], state: State) -> State:
         """Put x into a state."""
-        plume = self.vector.plume(x, plume_by_band(state, self.species))
-        return eqx.tree_at(lambda s: s.atmosphere.plumes[self.species], state, plume)
+        return self.vector.state(x, state)
 
     def __call__(self, x: Float[Array, "*batch x"], state: State) -> Float[Array, "*batch band"]:
-        """Reflectance factors that the imager would see. [-]"""
-        return reflectance_factor(
-            self.state(x, state),
-            self.bands,
-            gases=self.gases,
-            num_streams=self.num_streams,
-            num_doublings=self.num_doublings,
-        )
+        """Reflectance factors of C01 to C06 [-], and the radiance of C07 [W m-2 sr-1 um-1].
 
-
-def plume_by_band(state: State, species: str) -> Plume:
-    """The plume of a species, or `ValueError` if its optics are not specified by band."""
-    plume = state.atmosphere.plumes[species]
-    if not isinstance(plume, Plume):
-        kind = type(plume).__name__
-        raise ValueError(f"to be retrieved, {species!r} must be a Plume; got a {kind}.")
-    return plume
+        Where there is a fire, what it gives off is part of the reflectance factors.
+        """
+        full = self.state(x, state)
+        settings = {
+            "gases": self.gases,
+            "num_streams": self.num_streams,
+            "num_doublings": self.num_doublings,
+            "satellite": self.satellite,
+        }
+        if THERMAL not in self.bands and full.fire is None:
+            return reflectance_factor(full, self.bands, **settings)
+        seen = radiance(full, self.bands, **settings)
+        columns = [
+            seen[..., i]
+            if band == THERMAL
+            else reflectance_factor_from_radiance(seen[..., i], band, self.satellite)
+            for i, band in enumerate(self.bands)
+        ]
+        return jnp.stack(columns, axis=-1)
 
 
 def prepared(forward: ForwardModel, states: State) -> ForwardModel:
-    """Give a forward model doublings that suffice for every optical depth up to the limit.
+    """Give a forward model doublings that suffice for every x.
 
     Parameters
     ----------
@@ -81,23 +89,24 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
     """
     chunk = chunk_of_pixels_to_read()
     max_tau = np.max(map_chunks(partial(_largest_tau, forward), states, chunk=chunk))
-    min_mu = min(
-        np.min(np.cos(x)) for x in (states.geometry.solar_zenith, states.geometry.view_zenith)
-    )
+    cosines = (np.cos(x) for x in (states.geometry.solar_zenith, states.geometry.view_zenith))
+    min_mu = min(np.min(np.where(x > 0, x, 1.0)) for x in cosines)  # below the horizon: none
     num_doublings = sufficient_doublings(float(max_tau), float(min_mu), forward.num_streams)
     return replace(forward, num_doublings=num_doublings)
 
 
 @Kept
 def _largest_tau(forward: ForwardModel, states: State) -> Float[Array, " column"]:
-    """Optical depth of the thickest layer of each column at the limit of the state vector. [-]"""
+    """Optical depth of the thickest layer of each column at the extremes of x. [-]"""
     num_columns = states.geometry.solar_zenith.shape[0]
-    thickest = jnp.full((num_columns, forward.vector.size), jnp.inf)
-    thickest = thickest.at[:, 1:].set(0)
-    atmospheres = forward.state(thickest, states).atmosphere
+    extremes = product(*(q.transform.extremes for q in forward.vector.quantities))
 
     def of_one(atmosphere: Atmosphere) -> Float[Array, ""]:
         optics = [column_optics(atmosphere, BANDS[band], forward.gases) for band in forward.bands]
         return jnp.max(jnp.stack([jnp.max(layers.tau) for layers in optics]))
 
-    return jax.vmap(of_one)(atmospheres)
+    def at(x: Float[Array, " x"]) -> Float[Array, " column"]:
+        everywhere = jnp.broadcast_to(x, (num_columns, x.size))
+        return jax.vmap(of_one)(forward.state(everywhere, states).atmosphere)
+
+    return jnp.max(jax.lax.map(at, jnp.array(list(extremes))), axis=0)

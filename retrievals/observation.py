@@ -1,64 +1,189 @@
 """What the imager measured at each pixel, how well, and where that can be used."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
+from abi_operator import BANDS
+from abi_operator.instrument import (
+    IMAGER,
+    Imager,
+    noise_deviation,
+    radiance_from_reflectance_factor,
+    range_ceiling,
+    reflectance_factor_from_radiance,
+)
 from abi_operator.nomenclature import QUALITY_FLAGS
 
+from .forward import THERMAL
 from .results import ResultCode
 
-NOISE_FLOOR = 4.8e-4
-"""Noise in reflectance factor of a dark scene, `noise_sigma`. [-]"""
-NOISE_SLOPE = 1.09e-5
-"""Growth of the noise's variance with reflectance factor, `noise_sigma`. [-]"""
+LARGEST_REFLECTANCE_FACTOR = 2.0
+"""No scene reflects more than this, and files end at 1.25: it is in another unit (percent). [-]"""
 
 _ATTEMPTED = ResultCode.SUCCESS
 # Flags of pixels that are not attempted. Optics beyond what they were fitted to are no reason: the
 # retrieval's operator has the same.
 _UNUSABLE = sum(bit for name, bit in QUALITY_FLAGS.items() if name != "outside_fit")
+# How far a saturated band may be exceeded before its likelihood no longer changes, in sigma. [-]
+_ENOUGH = 6.0
 
 
 class Observation(eqx.Module):
-    """Reflectance factors of one column and the standard deviation of their noise. [-]"""
+    r"""Measurements of one column and the standard deviation of their noise.
 
-    reflectance_factor: Float[Array | np.ndarray, "*batch band"]
-    sigma: Float[Array | np.ndarray, "*batch band"]
+    A band whose measurement is NaN, or whose sigma is infinite, is missing and does not count. A
+    saturated one is a lower bound: with the forward model's F and the ceiling C its likelihood is
+    the probability that noise lifts F above it, :math:`\Phi((F - C) / \sigma)`.
 
-
-def noise_sigma(reflectance_factor: ArrayLike) -> np.ndarray:
-    r"""Noise of a reflectance factor, :math:`\sigma^2 = a^2 + b\rho`. [-]
-
-    The two constants meet the requirement of a signal-to-noise ratio of 300 at rho = 1 and the
-    ratio of 57 at rho = 0.05 that was measured in C02 [1]_.
-
-    References
+    Parameters
     ----------
-    .. [1] R. A. Iacovazzi and X. Wu, J. Appl. Remote Sens., 14, 026502, 2020,
-       doi:10.1117/1.JRS.14.026502
+    measured
+        Reflectance factor in C01 to C06 [-], radiance in C07 [W m-2 sr-1 um-1].
+    sigma
+        Standard deviation of the noise, in the same units.
+    saturated
+        Which bands are saturated; their `measured` is the ceiling. None if none is.
     """
-    return np.sqrt(NOISE_FLOOR**2 + NOISE_SLOPE * np.maximum(reflectance_factor, 0))
+
+    measured: Float[Array | np.ndarray, "*batch band"]
+    sigma: Float[Array | np.ndarray, "*batch band"]
+    saturated: Bool[Array | np.ndarray, "*batch band"] | None = None
+
+    @property
+    def present(self) -> Bool[Array, "*batch band"]:
+        """Bands that count, saturated or not."""
+        return jnp.isfinite(self.measured) & jnp.isfinite(self.sigma)
+
+    @property
+    def num_values(self) -> np.ndarray:
+        """Number of measurements that are values: bands neither missing nor saturated."""
+        counts = np.isfinite(self.measured) & np.isfinite(self.sigma)
+        if self.saturated is not None:
+            counts &= ~np.asarray(self.saturated)
+        return counts.sum(axis=-1)
+
+    def residual(self, predicted: Float[Array, "*batch band"]) -> Float[Array, "*batch band"]:
+        r"""Whitened departures of a forward model from the measurement, 0 in missing bands. [-]
+
+        In a saturated band it is :math:`\sqrt{-2 \ln \Phi(z)}`, with the whitened departure z: its
+        square is what the likelihood adds to the cost.
+        """
+        present = self.present
+        measured = jnp.where(present, jnp.asarray(self.measured, predicted.dtype), 0)
+        sigma = jnp.where(present, jnp.asarray(self.sigma, predicted.dtype), 1)
+        departure = (predicted - measured) / sigma
+        if self.saturated is not None:
+            departure = jnp.where(jnp.asarray(self.saturated), _censored(departure), departure)
+        return jnp.where(present, departure, 0)
 
 
-def add_noise(reflectance_factor: xr.DataArray, seed: int) -> xr.DataArray:
-    """Add Gaussian noise of `noise_sigma`, independent between pixels and bands."""
-    values = reflectance_factor.values
-    draws = np.random.default_rng(seed).standard_normal(values.shape)
-    return reflectance_factor.copy(data=values + noise_sigma(values) * draws)
+def _censored(departure: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    near = departure < _ENOUGH  # beyond, the square root of next to nothing has no slope
+    likelihood = jax.scipy.special.log_ndtr(jnp.where(near, departure, _ENOUGH))
+    # Its sign is that of a departure from below, so that a step knows which way to go.
+    return -jnp.sqrt(-2 * likelihood)
 
 
-def observe(columns: xr.Dataset, bands: tuple[str, ...]) -> Observation:
+def noise_sigma(measured: ArrayLike, band: str, imager: Imager = IMAGER) -> np.ndarray:
+    """Standard deviation of the instrument's noise, of measurements of one band.
+
+    Parameters
+    ----------
+    measured
+        Reflectance factor, or in C07 radiance; below 0 the noise is that of a dark scene.
+    band, imager
+        Name of the band, and the instrument, whose noise is `abi_operator.instrument.Noise`.
+    """
+    dark = jnp.maximum(jnp.asarray(measured, float), 0)
+    satellite = imager.satellite
+    if band == THERMAL:
+        return np.asarray(noise_deviation(dark, band, satellite, imager.noise))
+    radiance = radiance_from_reflectance_factor(dark, band, satellite)
+    sigma = noise_deviation(radiance, band, satellite, imager.noise)
+    return np.asarray(reflectance_factor_from_radiance(sigma, band, satellite))
+
+
+def ceiling(band: str, imager: Imager = IMAGER) -> float:
+    """Largest measurement that the instrument can tell: reflectance factor, or radiance in C07."""
+    temperature = imager.fire_saturation_temperature if band == THERMAL else None
+    if temperature is not None:
+        temperature = jnp.asarray(temperature, float)
+    top = jnp.asarray(range_ceiling(band, imager.satellite, temperature), float)
+    if band != THERMAL:
+        top = reflectance_factor_from_radiance(top, band, imager.satellite)
+    return float(top)
+
+
+def measurement(
+    measured: Float[ArrayLike, "*batch band"],
+    bands: Sequence[str],
+    imager: Imager = IMAGER,
+    *,
+    calibration: bool = False,
+    forward_error: float = 0.0,
+) -> Observation:
+    """An observation with the noise and the ceilings of the instrument.
+
+    Parameters
+    ----------
+    measured
+        Reflectance factors, and the radiance of C07, in the order of `bands`. What is at a band's
+        ceiling or above becomes the ceiling, and is saturated.
+    bands, imager
+        Names of the bands, and the instrument.
+    calibration
+        Whether the uncertainty of the calibration is part of sigma, as an error that is another one
+        in every pixel and band.
+    forward_error
+        Relative standard deviation of what the forward model itself is wrong by, in each band. [-]
+    """
+    values = np.asarray(measured, np.result_type(float))
+    relative = np.zeros(len(bands))
+    if calibration:
+        relative = np.array([float(imager.noise.calibration.get(band, 0.0)) for band in bands])
+    tops = np.array([ceiling(band, imager) for band in bands], values.dtype)
+    saturated = values >= tops
+    values = np.where(saturated, tops, values)
+    columns = [noise_sigma(values[..., i], band, imager) for i, band in enumerate(bands)]
+    other = np.hypot(relative, forward_error).astype(values.dtype) * values
+    return Observation(values, np.hypot(np.stack(columns, axis=-1), other), saturated)
+
+
+def add_noise(reflectance_factor: xr.DataArray, seed: int, imager: Imager = IMAGER) -> xr.DataArray:
+    """Add the instrument's noise, Gaussian, independent between pixels and bands."""
+    noisy = reflectance_factor.copy(deep=True)
+    for band in noisy["band"].values:
+        if band == "green":  # which the instrument lacks
+            continue
+        values = noisy.sel(band=band).values
+        own = np.random.default_rng([seed, list(BANDS).index(str(band))])
+        values = values + noise_sigma(values, str(band), imager) * own.standard_normal(values.shape)
+        noisy.loc[{"band": band}] = values
+    return noisy
+
+
+def observe(columns: xr.Dataset, bands: tuple[str, ...], imager: Imager = IMAGER) -> Observation:
     """Take the measurement vectors of a Dataset with a dimension ``column``."""
     measured = columns["reflectance_factor"].sel(band=list(bands))
+    if THERMAL in bands:
+        thermal = columns["radiance"].sel(band=list(bands))
+        measured = measured.where(measured["band"] != THERMAL, thermal)
     values = measured.transpose("column", "band").values.astype(np.float64)
-    return Observation(values, noise_sigma(values))
+    return measurement(values, bands, imager)
 
 
 def usable(
-    image: xr.Dataset, bands: tuple[str, ...], species: str, where: Literal["plume", "all"]
+    image: xr.Dataset,
+    bands: tuple[str, ...],
+    species: str | None,
+    where: Literal["plume", "cloud", "all"],
 ) -> np.ndarray:
     """Result code of the pixels that are not to be attempted, 0 (success) elsewhere.
 
@@ -69,15 +194,18 @@ def usable(
     bands
         Bands that are to be used.
     species
-        Name of the plume.
+        Name of the plume, None if none is retrieved.
     where
         ``"plume"``: only where the specified plume is (its brightness above 0), as if a plume mask
-        had been made beforehand; ``"all"``: everywhere.
+        had been made beforehand; ``"cloud"``: only where there is cloud water; ``"all"``:
+        everywhere.
     """
     codes = np.full((image.sizes["y"], image.sizes["x"]), _ATTEMPTED, np.int8)
     measured = image["reflectance_factor"].sel(band=list(bands)).transpose("band", "y", "x")
-    codes[~np.isfinite(measured.values).all(axis=0)] = ResultCode.INVALID_INPUT
+    codes[~np.isfinite(measured.values).any(axis=0)] = ResultCode.INVALID_INPUT
     codes[(image["quality_flag"].values & _UNUSABLE) != 0] = ResultCode.UNUSABLE
-    if where == "plume":
+    if where == "plume" and species is not None:
         codes[~(image[f"{species}_brightness"].values > 0)] = ResultCode.NO_PLUME
+    if where == "cloud":
+        codes[~(image["liquid_mass_path"].sum("layer").values > 0)] = ResultCode.NO_PLUME
     return codes

@@ -4,7 +4,7 @@ import numpy as np
 
 from .diagnostics import probability_of_cost
 from .inverse import Inversion
-from .results import ResultCode, expected_error
+from .results import ResultCode
 from .state_vector import StateVector
 
 EXACT_COST = 1e-6
@@ -16,17 +16,28 @@ SMALLEST_PROBABILITY = 1e-3
 RIVAL_COST = 4.0
 """A second minimum rivals the first if its cost is higher by less than this: two sigma. [-]"""
 
-_SAME_AOD = 1e-4  # minima that are closer than this, or than their errors, are one
+_SAME_X = 1e-3  # minima that are closer than this, or than their errors, are one
 
 
-def aod_550_sigma(vector: StateVector, inversion: Inversion) -> np.ndarray:
-    """Posterior standard deviation of the optical depth. [-]"""
-    variance = inversion.covariance[..., 0, 0]
-    return np.asarray(vector.aod_550_slope(inversion.x)) * np.sqrt(variance)
+def sigmas(vector: StateVector, inversion: Inversion) -> np.ndarray:
+    """Posterior standard deviation of each quantity, in its unit."""
+    variance = np.diagonal(inversion.covariance, axis1=-2, axis2=-1)
+    return np.asarray(vector.slopes(inversion.x)) * np.sqrt(variance)
+
+
+def same_solution(one: Inversion, two: Inversion) -> np.ndarray:
+    """Whether two solutions of each pixel are one, to what a minimisation leaves."""
+    apart = np.abs(np.asarray(one.x) - np.asarray(two.x))
+    return np.asarray(~(apart > _SAME_X).any(axis=-1))
 
 
 def result_codes(
-    vector: StateVector, best: Inversion, rival: Inversion, num_bands: int, *, exact: bool
+    vector: StateVector,
+    best: Inversion,
+    rival: Inversion,
+    num_values: np.ndarray,
+    *,
+    exact: bool,
 ) -> np.ndarray:
     """Judge the solutions of all pixels.
 
@@ -37,27 +48,39 @@ def result_codes(
     best, rival
         Solution of each pixel, and the minimum to which the other start led (the same again where
         there was no other).
-    num_bands
-        Number of measurements of a pixel.
+    num_values
+        Number of measurements of each pixel.
     exact
         Whether the measurements are free of noise, and no prior pulls the solution away from them.
     """
-    degrees_of_freedom = num_bands - (vector.size if np.all(best.prior_cost == 0) else 0)
-    if exact or degrees_of_freedom == 0:
-        explained = best.cost <= EXACT_COST
-    else:
-        explained = probability_of_cost(best.cost, degrees_of_freedom) >= SMALLEST_PROBABILITY
-    aod_550 = np.asarray(vector.aod_550(best.x))
-    sigma = aod_550_sigma(vector, best)
-    apart = np.abs(np.asarray(vector.aod_550(rival.x)) - aod_550)
+    alone = np.all(best.prior_cost == 0)
+    freedom = np.broadcast_to(num_values - (vector.size if alone else 0), best.cost.shape)
+    probability = probability_of_cost(best.cost, np.maximum(freedom, 1))
+    explained = np.where(
+        (freedom <= 0) | exact, best.cost <= EXACT_COST, probability >= SMALLEST_PROBABILITY
+    )
+    apart = np.abs(np.asarray(rival.x) - np.asarray(best.x))
     if exact:
-        rivalled = (rival.cost <= EXACT_COST) & (apart > _SAME_AOD)
+        rivalled = (rival.cost <= EXACT_COST) & (apart > _SAME_X).any(axis=-1)
     else:
-        rivalled = (rival.cost < best.cost + RIVAL_COST) & (apart > np.maximum(sigma, _SAME_AOD))
-    codes = np.full(aod_550.shape, ResultCode.SUCCESS, np.int8)
-    codes[~(sigma <= expected_error(aod_550))] = ResultCode.NOT_OBSERVABLE
-    codes[rival.converged & rivalled] = ResultCode.AMBIGUOUS
+        error = np.sqrt(np.diagonal(best.covariance, axis1=-2, axis2=-1))
+        rivalled = rival.cost < best.cost + RIVAL_COST
+        rivalled &= (apart > np.maximum(error, _SAME_X)).any(axis=-1)
+    codes = np.full(best.cost.shape, ResultCode.SUCCESS, np.int8)
+    codes[~_observable(vector, best)] = ResultCode.NOT_OBSERVABLE
+    codes[rival.converged & rivalled] = ResultCode.MULTIPLE_SOLUTIONS
     codes[~explained] = ResultCode.POOR_FIT
     codes[~best.converged] = ResultCode.NOT_CONVERGED
     codes[~np.isfinite(best.cost) | ~np.isfinite(best.x).all(-1)] = ResultCode.NONFINITE
     return codes
+
+
+def _observable(vector: StateVector, inversion: Inversion) -> np.ndarray:
+    """Whether all quantities are known as well as they are asked to be."""
+    values, errors = vector.values(inversion.x), sigmas(vector, inversion)
+    observable = np.isfinite(errors).all(axis=-1)
+    for i, quantity in enumerate(vector.quantities):
+        if quantity.largest_error is not None:
+            allowed = quantity.largest_error(np.asarray(values[quantity.name]))
+            observable &= errors[..., i] <= allowed
+    return np.asarray(observable)

@@ -15,8 +15,9 @@ class ResultCode(enum.IntEnum):
     NOT_CONVERGED = 4
     NONFINITE = 5
     POOR_FIT = 6
-    AMBIGUOUS = 7
+    MULTIPLE_SOLUTIONS = 7
     NOT_OBSERVABLE = 8
+    TOO_FEW_BANDS = 9
 
     @property
     def message(self) -> str:
@@ -27,28 +28,37 @@ class ResultCode(enum.IntEnum):
 _MESSAGES = {
     ResultCode.SUCCESS: "Retrieved.",
     ResultCode.NO_PLUME: (
-        "Not attempted: the plume mask has no smoke here; where='all' attempts every pixel."
+        "Not attempted: there is no plume, or no cloud, to be retrieved here; where='all' attempts "
+        "every pixel."
     ),
     ResultCode.UNUSABLE: (
         "Not attempted: quality_flag reports night, a grazing sun or view, or missing albedo."
     ),
     ResultCode.INVALID_INPUT: (
-        "Not attempted: reflectance or scenario is not finite here; repair the input."
+        "Not attempted: no measurement, one that is no reflectance factor (above 2: in percent?), "
+        "a sigma that is not above 0, or a prior that is not finite; repair the input."
     ),
     ResultCode.NOT_CONVERGED: (
-        "The number of steps ran out; allow more, or give a prior where there may be no smoke."
+        "The number of steps ran out; allow more, or give a prior where there may be no plume."
     ),
     ResultCode.NONFINITE: (
         "The operator was not finite at an iterate; look for impossible values in the scenario."
     ),
     ResultCode.POOR_FIT: (
-        "No optical depth explains the reflectances; the ground, cloud or aerosol assumed may be "
-        "wrong, retrieve_ssa=True may help, or the smoke may be thicker than aod_limit."
+        "No solution explains the measurements; the ground, cloud or aerosol assumed may be wrong, "
+        "retrieving more of it may help, or it may be thicker than its limit."
     ),
-    ResultCode.AMBIGUOUS: "Two optical depths explain the reflectances; add a band or a prior.",
+    ResultCode.MULTIPLE_SOLUTIONS: (
+        "Two solutions explain the measurements, and both are given; add a band or a prior."
+    ),
     ResultCode.NOT_OBSERVABLE: (
-        "The reflectances hardly depend on the smoke (ground or cloud near critical albedo, or "
-        "very thick smoke): the posterior error exceeds the expected error; add a band or a prior."
+        "The measurements hardly depend on what is retrieved (ground or cloud near critical "
+        "albedo, or a very thick plume): the posterior error exceeds the expected error; add a "
+        "band or a prior."
+    ),
+    ResultCode.TOO_FEW_BANDS: (
+        "Not attempted: fewer bands have values here, neither missing nor saturated, than there "
+        "are unknowns; give a prior."
     ),
 }
 

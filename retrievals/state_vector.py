@@ -1,116 +1,147 @@
-r"""From numbers without bounds to the smoke that they stand for, and what is known beforehand.
+r"""The retrieval's unknowns, x, and the state that they stand for.
 
-The retrieval's unknowns are a vector x that may take any real value, so that the minimisation
-needs no constraints:
-
-.. math::
-   \tau_{550} = \frac{\tau_\mathrm{limit}}{1 + e^{-x_0}}, \qquad
-   \frac{1 - \omega_b}{\omega_b} = e^{-x_1}\,\frac{1 - \omega_b^0}{\omega_b^0} .
-
-x_0 is the logarithm of the optical depth (plus a constant) as long as that is small beside
-`aod_limit`, and never lets an iterate exceed the optical depth for which the solver was prepared.
-x_1, if retrieved, shifts the logit of the single-scattering albedo by the same amount in every band
-b: the ratio of absorption to scattering changes by one factor, its spectrum stays.
+A state vector is a list of quantities, each of which says by itself where in a `State` it belongs
+(`quantities.Quantity`): a retrieval of something new is a declaration, as those of `declarations`
+are, and no new code. Each element of x may take any real value.
 """
 
-import equinox as eqx
+from collections import Counter
+from dataclasses import dataclass
+
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from abi_operator import Plume
+from abi_operator import State
+
+from .prior import Prior
+from .quantities import Derived, Quantity, part, with_part
 
 
-class StateVector(eqx.Module):
-    """Meaning of x. It is 0-based: x[0] is optical depth, x[1] single-scattering albedo.
+@dataclass(frozen=True)
+class StateVector:
+    """Meaning of x.
 
     Parameters
     ----------
-    retrieve_ssa
-        Whether x has its second element.
-    aod_limit
-        Upper limit of the optical depth at 550 nm, which x only reaches at infinity. [-]
+    quantities
+        One for each element of x. The last of them is put into a state first, so that one may
+        refine what a later one has set (a shift of the single-scattering albedo that belongs to
+        an effective radius).
+    derived
+        What is reported beside them.
     """
 
-    retrieve_ssa: bool = eqx.field(static=True, default=False)
-    aod_limit: float = eqx.field(static=True, default=10.0)
+    quantities: tuple[Quantity, ...]
+    derived: tuple[Derived, ...] = ()
 
-    def __check_init__(self) -> None:
-        if not self.aod_limit > 0:
-            raise ValueError(f"aod_limit must be positive; got {self.aod_limit}.")
+    def __post_init__(self) -> None:
+        if not self.quantities:
+            raise ValueError("a state vector needs a quantity.")
+        names = Counter(item.name for item in (*self.quantities, *self.derived))
+        twice = [name for name, number in names.items() if number > 1]
+        if twice:
+            raise ValueError(f"quantities need names of their own; {twice} are there twice.")
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return 2 if self.retrieve_ssa else 1
+        return len(self.quantities)
 
-    def x(
-        self, aod_550: Float[ArrayLike, "*batch"], ssa_shift: Float[ArrayLike, "*batch"] = 0.0
-    ) -> Float[Array, "*batch x"]:
-        """State vector of an optical depth below `aod_limit` [-] and a shift of the ssa [-]."""
-        share = jnp.asarray(aod_550, float) / self.aod_limit
-        logit = jnp.log(share) - jnp.log1p(-share)
-        if not self.retrieve_ssa:
-            return logit[..., None]
-        shift = jnp.asarray(ssa_shift, logit.dtype)
-        return jnp.stack(jnp.broadcast_arrays(logit, shift), axis=-1)
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the elements."""
+        return tuple(quantity.name for quantity in self.quantities)
 
-    def aod_550(self, x: Float[Array, "*batch x"]) -> Float[Array, "*batch"]:
-        """Optical depth at 550 nm. [-]"""
-        return self.aod_limit * jax.nn.sigmoid(x[..., 0])
+    def x(self, *values: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch x"]:
+        """State vector of one value for each quantity, each in its unit.
 
-    def aod_550_slope(self, x: Float[Array, "*batch x"]) -> Float[Array, "*batch"]:
-        """Derivative of `aod_550` in x[0], for the propagation of errors. [-]"""
-        return self.aod_limit * jax.nn.sigmoid(x[..., 0]) * jax.nn.sigmoid(-x[..., 0])
+        Raises
+        ------
+        ValueError
+            Where there are too few or too many.
+        """
+        if len(values) != self.size:
+            raise ValueError(f"x needs a value each of {', '.join(self.names)}; got {len(values)}.")
+        pairs = zip(self.quantities, values, strict=True)
+        elements = [quantity.transform.x(jnp.asarray(value, float)) for quantity, value in pairs]
+        return jnp.stack(jnp.broadcast_arrays(*elements), axis=-1)
 
-    def ssa(
-        self, x: Float[Array, "*batch x"], reference: Float[Array, "*batch"]
-    ) -> Float[Array, "*batch"]:
-        """Single-scattering albedo of a band in which it is `reference` at x[1] = 0. [-]"""
-        if not self.retrieve_ssa:
-            return reference
-        scattering = reference * jax.nn.sigmoid(x[..., 1])
-        absorption = (1 - reference) * jax.nn.sigmoid(-x[..., 1])
-        return scattering / (scattering + absorption)
+    def values(self, x: Float[Array, "*batch x"]) -> dict[str, Float[Array, "*batch"]]:
+        """The quantities, by name."""
+        return {q.name: q.transform.value(x[..., i]) for i, q in enumerate(self.quantities)}
 
-    def ssa_slope(
-        self, x: Float[Array, "*batch x"], reference: Float[Array, "*batch"]
-    ) -> Float[Array, "*batch"]:
-        """Derivative of `ssa` in x[1]. [-]"""
-        ssa = self.ssa(x, reference)
-        return ssa * (1 - ssa)
+    def slopes(self, x: Float[Array, "*batch x"]) -> Float[Array, "*batch x"]:
+        """Derivative of each quantity in its own element of x."""
+        columns = [q.transform.slope(x[..., i]) for i, q in enumerate(self.quantities)]
+        return jnp.stack(columns, axis=-1)
 
-    def plume(self, x: Float[Array, "*batch x"], plume: Plume) -> Plume:
-        """Put x into a plume, of which edges, spectrum and asymmetry are kept."""
-        extinction = self.aod_550(x) / (plume.top - plume.base)
-        ssa = {band: self.ssa(x, reference) for band, reference in plume.ssa.items()}
-        return eqx.tree_at(
-            lambda p: (p.extinction_550, p.brightness, p.ssa),
-            plume,
-            (extinction, jnp.ones_like(extinction), ssa),
-        )
+    def state(self, x: Float[Array, "*batch x"], state: State) -> State:
+        """Put x into a state.
 
+        Raises
+        ------
+        ValueError
+            Where the state has no such place.
+        """
+        for i, quantity in reversed(list(enumerate(self.quantities))):
+            node = part(state, quantity.place)
+            value = quantity.transform.value(x[..., i])
+            state = with_part(state, quantity.place, quantity.put(node, value))
+        return state
 
-class Prior(eqx.Module):
-    r"""What is known of x before the measurement, a normal distribution (Rodgers 2000 [1]_).
+    def held(self, state: State, name: str) -> Array:
+        """Value of a quantity that a state holds itself: the truth, or what is thought of it.
 
-    Parameters
-    ----------
-    x_prior
-        Its mean; `StateVector.x` makes one of physical quantities. [-]
-    S_prior
-        Its covariance. [-]
+        Raises
+        ------
+        ValueError
+            Where a state does not tell.
+        """
+        quantity = self.quantities[self.names.index(name)]
+        if quantity.get is None:
+            raise ValueError(f"a state does not tell its {name}.")
+        return jnp.asarray(quantity.get(part(state, quantity.place)))
 
-    References
-    ----------
-    .. [1] C. D. Rodgers, "Inverse Methods for Atmospheric Sounding", World Scientific, 2000,
-       doi:10.1142/3171
-    """
+    def prior(self, states: State | None = None) -> Prior:
+        """What is known of x where nobody says more, from the declarations of its elements.
 
-    x_prior: Float[Array, " x"]
-    S_prior: Float[Array, "x x"]
+        Parameters
+        ----------
+        states
+            Where means are those of the states: the pixels, batched along one leading axis.
 
-    def residual(self, x: Float[Array, " x"]) -> Float[Array, " x"]:
-        r"""Whitened departure :math:`L^{-1}(x - x_a)` with :math:`S_a = L L^T`. [-]"""
-        factor = jnp.linalg.cholesky(self.S_prior)
-        return jax.scipy.linalg.solve_triangular(factor, x - self.x_prior, lower=True)
+        Returns
+        -------
+        Prior
+            One for all pixels, or if there are `states` one for each of them.
+        """
+        means = []
+        for quantity in self.quantities:
+            mean = quantity.mean
+            if mean is None:
+                if states is None:
+                    raise ValueError(f"the prior of {quantity.name} is that of states; give them.")
+                mean = self.held(states, quantity.name)
+            means.append(np.asarray(quantity.transform.x(jnp.asarray(mean, float))))
+        x_prior = np.stack(np.broadcast_arrays(*means), axis=-1)
+        S_prior = np.diag(np.square([quantity.sigma for quantity in self.quantities]))
+        return Prior(x_prior, S_prior.astype(x_prior.dtype))
+
+    def report(
+        self, x: Float[Array, " x"], state: State, covariance: Float[Array, "x x"]
+    ) -> dict[str, Array | dict[str, Array]]:
+        r"""Derived quantities of one pixel, and their posterior standard deviations.
+
+        The latter, :math:`\sqrt{g^T \hat S g}` with the gradient g of the quantity, have
+        ``_sigma`` at the end of their names.
+        """
+
+        def derived(x: Float[Array, " x"]) -> dict[str, Array | dict[str, Array]]:
+            found = self.state(x, state)
+            return {item.name: item.read(part(found, item.place)) for item in self.derived}
+
+        gradients = jax.jacfwd(derived)(x)
+        sigma = jax.tree.map(lambda g: jnp.sqrt(g @ covariance @ g), gradients)
+        return derived(x) | {f"{name}_sigma": value for name, value in sigma.items()}

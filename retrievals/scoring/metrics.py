@@ -1,5 +1,6 @@
 """Numbers that say how far retrieved values are from the truth."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,8 @@ class Score(NamedTuple):
     correlation, slope
         Pearson's correlation, and slope of the regression of retrieved on true values. [-]
     within
-        Share of pairs inside the expected error (`expected_error` of the truth). [-]
+        Share of pairs inside the expected error (`expected_error` of the truth, of optical depth).
+        [-]
     """
 
     num_pairs: int
@@ -31,8 +33,21 @@ class Score(NamedTuple):
     within: float
 
 
-def score(retrieved: np.ndarray, truth: np.ndarray) -> Score:
-    """Score pairs of values, all of them finite."""
+Allowed = Callable[[np.ndarray], np.ndarray]
+
+
+def score(
+    retrieved: np.ndarray, truth: np.ndarray, allowed: Allowed | None = expected_error
+) -> Score:
+    """Score pairs of values, all of them finite.
+
+    Parameters
+    ----------
+    retrieved, truth
+        The pairs.
+    allowed
+        Error that is expected of a true value; None where nobody says what is to be expected.
+    """
     retrieved, truth = np.ravel(retrieved).astype(float), np.ravel(truth).astype(float)
     if retrieved.size == 0:
         return Score(0, *[float("nan")] * 6)
@@ -48,16 +63,21 @@ def score(retrieved: np.ndarray, truth: np.ndarray) -> Score:
         max_error=float(np.abs(error).max()),
         correlation=float(covariance / deviations) if deviations > 0 else float("nan"),
         slope=float(covariance / variance) if variance > 0 else float("nan"),
-        within=float(np.mean(np.abs(error) <= expected_error(truth))),
+        within=float("nan") if allowed is None else float(np.mean(np.abs(error) <= allowed(truth))),
     )
 
 
 def binned_scores(
-    retrieved: np.ndarray, truth: np.ndarray, by: np.ndarray, edges: tuple[float, ...]
+    retrieved: np.ndarray,
+    truth: np.ndarray,
+    by: np.ndarray,
+    edges: tuple[float, ...],
+    allowed: Allowed | None = expected_error,
 ) -> list[Score]:
     """Score the pairs in each bin ``edges[i] < by <= edges[i + 1]``; the first is closed."""
     bins = np.maximum(np.digitize(by, edges, right=True) - 1, 0)
-    return [score(retrieved[bins == i], truth[bins == i]) for i in range(len(edges) - 1)]
+    chosen = [bins == i for i in range(len(edges) - 1)]
+    return [score(retrieved[rows], truth[rows], allowed) for rows in chosen]
 
 
 def standardised_spread(error: np.ndarray, sigma: np.ndarray) -> tuple[float, float]:

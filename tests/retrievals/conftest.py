@@ -7,10 +7,10 @@ import xarray as xr
 from abi_operator import smoke
 from abi_operator.nomenclature import SCENARIO
 from abi_operator.scene import column_states, gases_of, simulate
+from retrievals.declarations import plume as plume_vector
 from retrievals.forward import ForwardModel, prepared
+from retrievals.kinds import BANDS
 from retrievals.observation import observe
-from retrievals.smoke import BANDS
-from retrievals.state_vector import StateVector
 
 HEIGHT = np.array([60e3, 20e3, 8e3, 3e3, 2e3, 1e3, 500.0, 0.0])
 DARK, BRIGHT, CLOUDY = 0, 1, 2  # rows of a scene: dark ground, bright ground, dark under cloud
@@ -98,4 +98,4 @@ def columns(simulated):
 def forward(simulated, columns):
     """Forward model with the settings of the simulation: that of `retrieve_smoke`."""
     settings = {"num_streams": simulated.attrs["num_streams"], "gases": gases_of(simulated)}
-    return prepared(ForwardModel(StateVector(), BANDS, **settings), columns[1])
+    return prepared(ForwardModel(plume_vector("smoke"), BANDS, **settings), columns[1])

@@ -33,14 +33,14 @@ def run():
 
 def test_retrieve_and_score(folder, run):
     out = folder / "new" / "smoke.nc"
-    answer = run("retrieve", folder / "result.nc", "--out", out)
+    answer = run("retrieve", "smoke", folder / "result.nc", "--out", out)
     assert answer.exit_code == 0, answer.output
     with xr.open_dataset(out) as written:
         assert written["result_code"].dtype == np.int8
         assert written["aod_550"].dims == ("time", "y", "x")
         assert written.attrs["Conventions"] == "CF-1.11"
         latest, earlier = written.attrs["history"].split("\n")
-        assert f": abi-operator retrieve {folder / 'result.nc'} --out {out}" in latest
+        assert f": abi-operator retrieve smoke {folder / 'result.nc'} --out {out}" in latest
         assert "written by abi_operator" in earlier
     csv = folder / "scores.csv"
     answer = run("score", folder / "result.nc", out, "--csv", csv)
@@ -53,9 +53,31 @@ def test_retrieve_and_score(folder, run):
         result.drop_vars(["pressure", "smoke_ssa", "smoke_aod_550"]).to_netcdf(image)
     answer = run("score", image, out)
     assert answer.exit_code == 2 and "has no smoke_aod_550; give the one that" in answer.stderr
-    answer = run("retrieve", image, "--out", folder / "x.nc")
+    answer = run("retrieve", "smoke", image, "--out", folder / "x.nc")
     assert answer.exit_code == 2 and "has no pressure, smoke_ssa; simulate a " in answer.stderr
     assert "and without --variables" in answer.stderr
+
+
+def test_a_prior_from_a_file_and_diagnostics(folder, run):
+    prior = folder / "prior.toml"
+    prior.write_text("[aod_550]\nmean = 0.5\nsigma = 0.4\n")
+    out = folder / "smoke.nc"
+    how = ("--noise", "--prior", prior, "--diagnostics")
+    answer = run("retrieve", "smoke", folder / "result.nc", "--out", out, *how)
+    assert answer.exit_code == 0, answer.output
+    with xr.open_dataset(out) as written:
+        done = written.isel(time=0).stack(pixel=("y", "x"))
+        assert (done["result_code"] == ResultCode.SUCCESS).sum() >= 10
+        assert done["averaging_kernel"].dims == ("element", "element_2", "pixel")
+        assert done["gain"].dims == ("element", "band", "pixel")
+        kernel = done["averaging_kernel"].values[0, 0]
+        # One is of the last step's Jacobian, the other of the solution's.
+        np.testing.assert_allclose(kernel, done["degrees_of_freedom"], rtol=1e-2)
+        parts = np.hypot(done["aod_550_noise_error"], done["aod_550_smoothing_error"])
+        np.testing.assert_allclose(parts, done["aod_550_sigma"], rtol=1e-2)
+        assert (done["aod_550_error_due_to_albedo_C02"] > 0).all()
+        assert (done["cost"] > 0).all() and (done["prior_cost"] > 0).all()
+        assert written.attrs["prior"] == "normal distribution"
 
 
 def test_the_demonstration_ends_with_scores(folder, capsys):
@@ -67,12 +89,18 @@ def test_the_demonstration_ends_with_scores(folder, capsys):
 
 
 def test_trouble_is_one_sentence(folder, run):
-    answer = run("retrieve", folder / "none.nc", "--out", folder / "x.nc")
+    answer = run("retrieve", "smoke", folder / "none.nc", "--out", folder / "x.nc")
     assert answer.exit_code == 2 and "does not exist" in answer.stderr
-    answer = run("retrieve", folder / "result.nc", "--out", folder / "x.nc", "--bands", "C01,C06")
+    answer = run(
+        "retrieve", "smoke", folder / "result.nc", "--out", folder / "x.nc", "--bands", "C01,C06"
+    )
     assert answer.exit_code == 2 and "no band C06" in answer.stderr
-    answer = run("retrieve", folder / "result.nc", "--out", folder / "x.nc", "--bands", "C99")
+    answer = run(
+        "retrieve", "smoke", folder / "result.nc", "--out", folder / "x.nc", "--bands", "C99"
+    )
     assert answer.exit_code == 2 and "C99" in answer.stderr
+    answer = run("retrieve", "fog", folder / "result.nc", "--out", folder / "x.nc")
+    assert answer.exit_code == 2 and "smoke, ash, dust, cloud" in answer.stderr
     answer = run("score", folder / "result.nc", folder / "result.nc")
     assert answer.exit_code == 2 and "no result_code" in answer.stderr
     assert not (folder / "x.nc").exists()

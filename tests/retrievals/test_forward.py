@@ -6,10 +6,10 @@ import numpy as np
 
 from abi_operator import reflectance_factor
 from abi_operator.scene import column_states, gases_of, simulate
+from retrievals.declarations import plume
 from retrievals.forward import ForwardModel
+from retrievals.kinds import BANDS
 from retrievals.observation import observe
-from retrievals.smoke import BANDS
-from retrievals.state_vector import StateVector
 
 ROUNDING = 1e-11
 
@@ -17,12 +17,12 @@ ROUNDING = 1e-11
 def test_the_true_x_gives_what_was_simulated(columns, forward):
     observation, states, truth = columns
     value = forward(forward.vector.x(truth), states)
-    np.testing.assert_allclose(value, observation.reflectance_factor, rtol=ROUNDING)
+    np.testing.assert_allclose(value, observation.measured, rtol=ROUNDING)
 
 
 def test_the_state_is_what_is_seen(columns, forward):
     _, states, truth = columns
-    model = replace(forward, vector=StateVector(retrieve_ssa=True))
+    model = replace(forward, vector=plume("smoke", ssa=True))
     x = model.vector.x(np.full(len(truth), 1.3), -0.5)
     state = model.state(x, states)
     np.testing.assert_allclose(state.atmosphere.plumes["smoke"].aod_550, 1.3, rtol=ROUNDING)
@@ -51,9 +51,9 @@ def test_gases_and_ice_of_the_simulation_are_those_of_the_forward_model(make_sce
     assert simulated.attrs["gases"] == "O3"
     stacked = simulated.stack(column=("y", "x"))
     states, truth = column_states(stacked, BANDS), stacked["smoke_aod_550"].values
-    model = ForwardModel(StateVector(), BANDS, num_streams=2, gases=gases_of(stacked))
+    model = ForwardModel(plume("smoke"), BANDS, num_streams=2, gases=gases_of(stacked))
     value = model(model.vector.x(truth), states)
-    np.testing.assert_allclose(value, observe(stacked, BANDS).reflectance_factor, rtol=ROUNDING)
+    np.testing.assert_allclose(value, observe(stacked, BANDS).measured, rtol=ROUNDING)
     none = replace(states.atmosphere.gases, ozone=0 * states.atmosphere.gases.ozone)
     without = replace(states, atmosphere=replace(states.atmosphere, gases=none))
     others = model(model.vector.x(truth), without)

@@ -7,13 +7,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from veil import VEIL, veiled_pixels
 
-from retrievals.inverse import Minimiser, invert
-from retrievals.observation import Observation, noise_sigma
+from retrievals import Quantity, StateVector, Unbounded, measurement
+from retrievals.inverse import SOLVERS, Minimiser, invert
+from retrievals.kinds import BANDS
 from retrievals.pixels import retrieve_pixels
+from retrievals.prior import Prior
+from retrievals.quantities import replaced
 from retrievals.results import ResultCode
-from retrievals.smoke import BANDS
-from retrievals.state_vector import Prior, StateVector
 
 # What a last step below the tolerance of 1e-6 leaves, times the derivative of optical depth.
 CONVERGED = 1e-8
@@ -33,7 +35,7 @@ def retrieved(columns, forward):
 def test_noise_free_recovery(columns, forward, retrieved):
     truth = columns[2]
     success = retrieved.codes == ResultCode.SUCCESS
-    error = np.asarray(forward.vector.aod_550(retrieved.inversion.x)) - truth
+    error = np.asarray(forward.vector.values(retrieved.inversion.x)["aod_550"]) - truth
     assert success.sum() >= 10
     assert set(retrieved.codes[~success]) <= {ResultCode.NOT_OBSERVABLE}
     np.testing.assert_allclose(error, 0, atol=CONVERGED)
@@ -54,10 +56,13 @@ def test_a_pixel_that_is_not_finite_fails_alone(columns, forward, retrieved):
     pressure = states.atmosphere.pressure.copy()
     pressure[2] = np.nan
     broken = replace(states, atmosphere=replace(states.atmosphere, pressure=pressure))
-    values = observation.reflectance_factor.copy()
+    values = observation.measured.copy()
     values[5] = np.nan
-    again = retrieve_pixels(forward, Observation(values, observation.sigma), broken, exact=True)
-    assert again.codes[2] == again.codes[5] == ResultCode.NONFINITE
+    values[1, 0] = np.nan  # one band of three is left out
+    given = replace(observation, measured=values)
+    again = retrieve_pixels(forward, given, broken, exact=True)
+    assert again.codes[2] == ResultCode.NONFINITE
+    assert again.codes[5] == ResultCode.INVALID_INPUT
     others = np.delete(np.arange(len(values)), [2, 5])
     np.testing.assert_array_equal(again.codes[others], retrieved.codes[others])
     np.testing.assert_allclose(
@@ -65,30 +70,10 @@ def test_a_pixel_that_is_not_finite_fails_alone(columns, forward, retrieved):
     )
 
 
-@dataclass(frozen=True)
-class Veil:
-    """A forward model that costs nothing: smoke that hides the ground it is mixed with.
-
-    The state is the reflectance of the ground, by band.
-    """
-
-    vector: StateVector = StateVector()
-    bands: tuple[str, ...] = BANDS
-
-    def __call__(self, x, state):
-        transmittance = jnp.exp(-self.vector.aod_550(x)[..., None] * jnp.array([1.4, 0.7, 0.3]))
-        return state * transmittance + (1 - transmittance) * jnp.array([0.35, 0.4, 0.3])
-
-
-VEIL = Veil()
-
-
 @pytest.fixture(scope="module")
 def veiled():
     """Observations, states and true optical depths of pixels under a veil."""
-    ground, truth = np.linspace(0.02, 0.2, 12)[:, None] * np.ones(3), np.geomspace(0.05, 2, 12)
-    seen = np.asarray(VEIL(VEIL.vector.x(truth), jnp.asarray(ground)))
-    return Observation(seen, noise_sigma(seen)), ground, truth
+    return veiled_pixels()
 
 
 @pytest.fixture(scope="module")
@@ -139,5 +124,60 @@ def test_a_solution_can_be_mapped_over_starts(veiled, solve):
     observation, states, truth = veiled
     starts = VEIL.vector.x(jnp.array([0.1, 0.5, 1.5]))
     solutions = solve(pixel(observation, 4), pixel(states, 4), starts)
-    np.testing.assert_allclose(VEIL.vector.aod_550(solutions.x), truth[4], atol=CONVERGED)
+    found = VEIL.vector.values(solutions.x)["aod_550"]
+    np.testing.assert_allclose(found, truth[4], atol=CONVERGED)
     assert len(BANDS) == observation.sigma.shape[1]
+
+
+def test_every_solver_leads_to_the_same_minimum(veiled):
+    observation, states, truth = veiled
+    prior = Prior(np.asarray(VEIL.vector.x(np.full(12, 0.3))), np.eye(1))
+    tight = Minimiser(1e-8, 200, "levenberg_marquardt")
+    expected = retrieve_pixels(VEIL, observation, states, prior=prior, minimiser=tight)
+    assert expected.inversion.converged.all()
+    sigma = np.sqrt(expected.inversion.covariance[:, 0, 0])
+    for solver in SOLVERS:
+        how = Minimiser(None, 40, solver, "prior")
+        found = retrieve_pixels(VEIL, observation, states, prior=prior, minimiser=how)
+        assert found.inversion.converged.all()
+        departure = (found.inversion.x - expected.inversion.x)[:, 0] / sigma
+        assert np.abs(departure).max() < 0.02, solver
+
+
+def test_what_cannot_be_asked_of_a_minimiser_is_said(veiled):
+    observation, states, _ = veiled
+    for how, words in (
+        (Minimiser(solver="newton"), "no solver 'newton'; choose from dogleg"),
+        (Minimiser(starts="prior"), "starts must be 'scan', or with a prior 'prior'"),
+        (Minimiser(tolerance=0.0), "tolerance must be above 0"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            retrieve_pixels(VEIL, observation, states, minimiser=how)
+
+
+NUMBER = Quantity(
+    "q", "1", "a number", "q", Unbounded(), replaced, sigma=1.0, mean=0.0, starts=(-3.0, 0.5, 2.0)
+)
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """A forward model with two solutions: x and -x."""
+
+    vector: StateVector = StateVector((NUMBER,))
+    bands: tuple[str, ...] = ("C01",)
+
+    def __call__(self, x, state):
+        return 0.1 * x**2 + state
+
+
+def test_both_of_two_solutions_are_given():
+    truth = np.array([0.5, 1.0, 2.0])
+    seen = measurement(0.1 * truth[:, None] ** 2, ("C01",))
+    found = retrieve_pixels(Parabola(), seen, np.zeros((3, 1)), exact=True)
+    assert set(found.codes) == {ResultCode.MULTIPLE_SOLUTIONS}
+    both = np.sort(np.concatenate([found.inversion.x, found.other.x], axis=1), axis=1)
+    np.testing.assert_allclose(both, np.stack([-truth, truth], axis=1), atol=CONVERGED)
+    nothing = Prior(truth[:, None], np.full((1, 1), 0.01))
+    alone = retrieve_pixels(Parabola(), seen, np.zeros((3, 1)), prior=nothing)
+    assert set(alone.codes) == {ResultCode.SUCCESS}

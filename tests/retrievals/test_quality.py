@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
+from retrievals.declarations import plume
 from retrievals.diagnostics import probability_of_cost
 from retrievals.inverse import Inversion
-from retrievals.quality import EXACT_COST, aod_550_sigma, result_codes
+from retrievals.quality import EXACT_COST, result_codes, sigmas
 from retrievals.results import ResultCode, flag_attributes
-from retrievals.state_vector import StateVector
 
-VECTOR = StateVector()
+VECTOR = plume("smoke")
 
 
 def inversion(aod_550=0.5, sigma=0.01, cost=0.0, converged=True):
     """One pixel's inversion, as if it had been found."""
     x = np.asarray(VECTOR.x(np.array([aod_550])))
-    variance = (sigma / np.asarray(VECTOR.aod_550_slope(x))) ** 2
+    variance = (sigma / np.asarray(VECTOR.slopes(x))[:, 0]) ** 2
     return Inversion(
         x=x,
         covariance=variance[:, None, None],
@@ -29,11 +29,11 @@ def inversion(aod_550=0.5, sigma=0.01, cost=0.0, converged=True):
 
 def code(best, rival=None, exact=True, num_bands=3):
     rival = best if rival is None else rival
-    return ResultCode(result_codes(VECTOR, best, rival, num_bands, exact=exact)[0])
+    return ResultCode(result_codes(VECTOR, best, rival, np.array([num_bands]), exact=exact)[0])
 
 
 def test_the_error_of_optical_depth_is_propagated():
-    np.testing.assert_allclose(aod_550_sigma(VECTOR, inversion(sigma=0.03)), 0.03, rtol=1e-13)
+    np.testing.assert_allclose(sigmas(VECTOR, inversion(sigma=0.03)), [[0.03]], rtol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -59,15 +59,17 @@ def test_noise_excuses_what_it_explains():
     np.testing.assert_allclose(probability_of_cost(np.array([5.0]), 2), np.exp(-2.5), rtol=1e-12)
 
 
-def test_a_rival_makes_a_minimum_ambiguous():
+def test_a_rival_is_a_second_solution():
     best = inversion(aod_550=0.5, cost=1.0)
-    assert code(best, inversion(aod_550=2.0, cost=4.0), exact=False) == ResultCode.AMBIGUOUS
+    assert (
+        code(best, inversion(aod_550=2.0, cost=4.0), exact=False) == ResultCode.MULTIPLE_SOLUTIONS
+    )
     assert code(best, inversion(aod_550=2.0, cost=6.0), exact=False) == ResultCode.SUCCESS
     assert code(best, inversion(aod_550=0.505, cost=1.0), exact=False) == ResultCode.SUCCESS
     unfinished = inversion(aod_550=2.0, cost=4.0, converged=False)
     assert code(best, unfinished, exact=False) == ResultCode.SUCCESS
     exact = inversion(aod_550=0.5)
-    assert code(exact, inversion(aod_550=0.6)) == ResultCode.AMBIGUOUS
+    assert code(exact, inversion(aod_550=0.6)) == ResultCode.MULTIPLE_SOLUTIONS
     assert code(exact, inversion(aod_550=0.6, cost=1e-5)) == ResultCode.SUCCESS
 
 

@@ -5,9 +5,24 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator import smoke
-from retrievals.smoke import BANDS
-from retrievals.state_vector import Prior, StateVector
+from abi_operator import (
+    Atmosphere,
+    Fire,
+    Geometry,
+    LiquidCloud,
+    State,
+    ash,
+    mie_plume,
+    smoke,
+)
+from abi_operator.optics import effective_radius, mie_optics
+from retrievals import Bounded, Prior, Quantity, StateVector, Unbounded
+from retrievals.declarations import albedo, aod_550, fire, liquid_cloud, plume
+from retrievals.kinds import BANDS
+from retrievals.quantities import part, replaced, scaled
+
+AOD_550 = np.array([1e-4, 0.05, 0.7, 3.0, 9.9])
+ROUNDING = 1e-12
 
 
 def shifted(ssa, shift):
@@ -15,66 +30,173 @@ def shifted(ssa, shift):
     return 1 / (1 + (1 - ssa) / ssa * np.exp(-shift))
 
 
-AOD_550 = np.array([1e-4, 0.05, 0.7, 3.0, 9.9])
-ROUNDING = 1e-13
-
-
-def test_x_stands_for_the_quantities_it_was_made_of():
-    vector = StateVector(retrieve_ssa=True)
-    shift = np.linspace(-2, 2, len(AOD_550))
-    x = vector.x(AOD_550, shift)
-    np.testing.assert_allclose(vector.aod_550(x), AOD_550, rtol=ROUNDING)
-    ssa = vector.ssa(x, jnp.full(len(AOD_550), 0.9))
-    np.testing.assert_allclose(ssa, shifted(0.9, shift), rtol=ROUNDING)
-
-
-def test_without_ssa_x_is_optical_depth_alone():
-    vector = StateVector()
-    assert vector.x(0.3).shape == (1,)
-    assert vector.ssa(vector.x(0.3), 0.9) == 0.9
-
-
-def test_x0_is_the_logarithm_of_thin_smoke():
-    vector = StateVector()
-    np.testing.assert_allclose(vector.x(2e-4) - vector.x(1e-4), np.log(2), rtol=2e-5)
-
-
-def test_any_real_x_is_a_possible_plume():
-    vector = StateVector(retrieve_ssa=True, aod_limit=6.0)
-    x = jnp.array([[-500.0, -500.0], [500.0, 500.0], [0.0, 0.0]])
-    reference = jnp.array([0.0, 1.0, 0.9])
-    for quantity in (vector.aod_550, lambda x: vector.ssa(x, reference)):
-        value, slope = jax.jvp(quantity, (x,), (jnp.ones_like(x),))
-        assert np.isfinite(value).all() and np.isfinite(slope).all()
-    assert (vector.aod_550(x) <= 6.0).all()
-    np.testing.assert_array_equal(vector.ssa(x, reference), reference)
-
-
-def test_slopes_are_derivatives():
-    vector = StateVector(retrieve_ssa=True)
-    x = vector.x(AOD_550, 0.3)
-    reference = jnp.full(len(AOD_550), 0.9)
-    _, aod_slope = jax.jvp(vector.aod_550, (x,), (jnp.ones_like(x),))
-    np.testing.assert_allclose(vector.aod_550_slope(x), aod_slope, rtol=ROUNDING)
-    _, ssa_slope = jax.jvp(lambda x: vector.ssa(x, reference), (x,), (jnp.ones_like(x),))
-    np.testing.assert_allclose(vector.ssa_slope(x, reference), ssa_slope, rtol=1e-12)
-
-
-def test_a_plume_gets_optical_depth_and_albedo_and_keeps_the_rest():
-    vector, before = StateVector(retrieve_ssa=True), smoke(0.2, brightness=0.3, bands=BANDS)
-    after = vector.plume(vector.x(1.7, -0.6), before)
-    np.testing.assert_allclose(after.aod_550, 1.7, rtol=ROUNDING)
-    for band in BANDS:
-        np.testing.assert_allclose(after.ssa[band], shifted(before.ssa[band], -0.6), rtol=ROUNDING)
-    assert (after.base, after.top) == (before.base, before.top)
-    assert after.relative_extinction is before.relative_extinction or (
-        after.relative_extinction == before.relative_extinction
+@pytest.fixture(scope="module")
+def state():
+    """One column with a plume of each kind, cloud in two of three layers, and a fire."""
+    mass, number = np.array([0.0, 0.02, 0.06]), np.array([0.0, 3e10, 4e10])
+    plumes = {
+        "smoke": smoke(0.2, brightness=0.3, bands=BANDS),
+        "ash": ash(0.5, bands=BANDS),
+        "dust": mie_plume("dust", 0.3, 1.5, base=0.0, top=2e3),
+    }
+    air = Atmosphere(
+        jnp.array([0.0, 3e4, 8e4, 1e5]),
+        jnp.array([3e4, 9e3, 2e3, 0.0]),
+        LiquidCloud(jnp.asarray(mass), jnp.asarray(number)),
+        plumes,
+    )
+    albedo = {band: jnp.asarray(0.1) for band in BANDS}
+    return State(
+        air,
+        albedo,
+        Geometry(*(jnp.asarray(angle) for angle in (0.6, 0.8, 1.2))),
+        jnp.asarray(300.0),
+        Fire(jnp.asarray(0.01), jnp.asarray(700.0)),
     )
 
 
-def test_the_limit_is_positive():
+@pytest.mark.parametrize(
+    ("transform", "values"),
+    [
+        (Bounded(0.0, 10.0), AOD_550),
+        (Bounded(350.0, 1800.0), np.array([351.0, 900.0, 1799.0])),
+        (Bounded(0.043, 0.56, logarithmic=True), np.array([0.05, 0.1, 0.5])),
+        (Unbounded(), np.array([-2.0, 0.0, 2.0])),
+    ],
+)
+def test_transforms_are_smooth_and_have_an_inverse(transform, values):
+    x = transform.x(jnp.asarray(values))
+    np.testing.assert_allclose(transform.value(x), values, rtol=ROUNDING)
+    _, slope = jax.jvp(transform.value, (x,), (jnp.ones_like(x),))
+    np.testing.assert_allclose(transform.slope(x), slope, rtol=ROUNDING)
+    wild = jnp.array([-500.0, 500.0, 0.0])
+    value, slope = jax.jvp(transform.value, (wild,), (jnp.ones_like(wild),))
+    assert np.isfinite(value).all() and np.isfinite(slope).all()
+    if isinstance(transform, Bounded):
+        assert (value >= transform.lower).all() and (value <= transform.upper * 1.000001).all()
+
+
+def test_limits_are_in_order():
+    for limits in ((1.0, 1.0), (2.0, 1.0), (0.0, np.inf)):
+        with pytest.raises(ValueError, match="lower < upper"):
+            Bounded(*limits)
+    with pytest.raises(ValueError, match="0 < lower"):
+        Bounded(0.0, 1.0, logarithmic=True)
     with pytest.raises(ValueError, match="aod_limit must be positive; got 0"):
-        StateVector(aod_limit=0.0)
+        plume("smoke", aod_limit=0.0)
+
+
+def test_x0_is_the_logarithm_of_thin_smoke():
+    vector = plume("smoke")
+    np.testing.assert_allclose(vector.x(2e-4) - vector.x(1e-4), np.log(2), rtol=2e-5)
+
+
+def test_a_plume_gets_optical_depth_and_albedo_and_keeps_the_rest(state):
+    vector, before = plume("smoke", ssa=True), state.atmosphere.plumes["smoke"]
+    x = vector.x(1.7, -0.6)
+    assert vector.names == ("aod_550", "ssa_shift") and x.shape == (2,)
+    found = vector.state(x, state)
+    after = found.atmosphere.plumes["smoke"]
+    np.testing.assert_allclose(after.aod_550, 1.7, rtol=ROUNDING)
+    np.testing.assert_allclose(vector.held(found, "aod_550"), 1.7, rtol=ROUNDING)
+    for band in BANDS:
+        np.testing.assert_allclose(after.ssa[band], shifted(before.ssa[band], -0.6), rtol=ROUNDING)
+    assert (after.base, after.top) == (before.base, before.top)
+    assert after.relative_extinction == before.relative_extinction
+    assert found.albedo == state.albedo and found.atmosphere.plumes["ash"].aod_550 == 0.5
+
+
+def test_an_effective_radius_sets_what_a_shift_refines(state):
+    vector = plume("ash", ssa=True, effective_radius=True)
+    found = vector.state(vector.x(0.8, 0.5, 2.0), state).atmosphere.plumes["ash"]
+    for band in BANDS:
+        spheres = mie_optics("ash", jnp.asarray(2.0), band)
+        expected = shifted(1 - spheres.coalbedo, 0.5)
+        np.testing.assert_allclose(found.ssa[band], expected, rtol=ROUNDING)
+        np.testing.assert_allclose(found.asymmetry[band], spheres.asymmetry, rtol=ROUNDING)
+    mie = plume("dust", effective_radius=True)
+    found = mie.state(mie.x(0.8, 4.0), state)
+    np.testing.assert_allclose(mie.held(found, "effective_radius_um"), 4.0, rtol=ROUNDING)
+    np.testing.assert_allclose(mie.held(found, "aod_550"), 0.8, rtol=ROUNDING)
+
+
+def test_a_cloud_gets_optical_thickness_and_radius(state):
+    vector = liquid_cloud()
+    found = vector.state(vector.x(12.0, 8.0), state)
+    np.testing.assert_allclose(vector.held(found, "cloud_optical_thickness"), 12, rtol=ROUNDING)
+    np.testing.assert_allclose(effective_radius(found.atmosphere.liquid)[1:], 8e-6, rtol=ROUNDING)
+    np.testing.assert_allclose(vector.held(found, "cloud_effective_radius_um"), 8, rtol=ROUNDING)
+    mass = found.atmosphere.liquid.mass_path
+    assert mass[0] == 0
+    np.testing.assert_allclose(mass.sum(), 12 * 8e-6 * 1000 / 1.5, rtol=ROUNDING)
+
+
+def test_fire_and_ground_are_leaves(state):
+    vector = StateVector((*fire().quantities, albedo("C02")))
+    found = vector.state(vector.x(900.0, 1e-3, 0.3), state)
+    np.testing.assert_allclose(found.fire.temperature, 900, rtol=ROUNDING)
+    np.testing.assert_allclose(found.fire.fraction, 1e-3, rtol=ROUNDING)
+    np.testing.assert_allclose(found.albedo["C02"], 0.3, rtol=ROUNDING)
+    assert found.albedo["C01"] == state.albedo["C01"]
+
+
+def test_a_quantity_of_ones_own_is_a_declaration(state):
+    """The height of the plume's top, and a factor of the mass of all cloud, in a few lines."""
+    top = Quantity(
+        "plume_top", "m", "upper edge", "atmosphere.plumes.smoke.top",
+        Bounded(1200.0, 9000.0), replaced, sigma=0.5, mean=3000.0,
+    )  # fmt: skip
+    thicker = Quantity(
+        "cloud_factor", "1", "factor of the cloud", "atmosphere.liquid", Unbounded(), scaled,
+        sigma=0.1, mean=1.0,
+    )  # fmt: skip
+    vector = StateVector((top, thicker))
+    found = vector.state(vector.x(2500.0, 1.1), state)
+    np.testing.assert_allclose(found.atmosphere.plumes["smoke"].top, 2500, rtol=ROUNDING)
+    np.testing.assert_allclose(found.atmosphere.liquid.mass_path[2], 0.066, rtol=ROUNDING)
+    np.testing.assert_allclose(vector.prior().S_prior, np.diag([0.25, 0.01]))
+    np.testing.assert_allclose(vector.values(vector.prior().x_prior)["plume_top"], 3000)
+
+
+def test_what_a_state_lacks_is_named(state):
+    with pytest.raises(ValueError, match="has no atmosphere.plumes.fog.*smoke.*ash.*dust"):
+        vector = StateVector((aod_550("fog"),))
+        vector.state(vector.x(0.3), state)
+    with pytest.raises(ValueError, match="has no albedo.C07.*C01"):
+        part(state, "albedo.C07")
+    with pytest.raises(ValueError, match="value each of aod_550, ssa_shift; got 1"):
+        plume("smoke", ssa=True).x(0.3)
+    with pytest.raises(ValueError, match="aod_550.*twice"):
+        StateVector((aod_550("smoke"), aod_550("ash")))
+    with pytest.raises(ValueError, match="no Mie table of 'fog'"):
+        plume("fog", effective_radius=True)
+
+
+def test_reported_errors_are_propagated(state):
+    vector = plume("smoke", ssa=True)
+    x, covariance = vector.x(0.8, 0.3), jnp.array([[0.04, 0.01], [0.01, 0.09]])
+    found = vector.report(x, state, covariance)
+    for band in BANDS:
+        ssa = shifted(state.atmosphere.plumes["smoke"].ssa[band], 0.3)
+        np.testing.assert_allclose(found["ssa"][band], ssa, rtol=ROUNDING)
+        np.testing.assert_allclose(found["ssa_sigma"][band], 0.3 * ssa * (1 - ssa), rtol=1e-9)
+
+
+def test_priors_are_those_of_the_declarations_or_of_the_states(state):
+    vector = StateVector((aod_550("smoke"), albedo("C01"), albedo("C02")))
+    three = jax.tree.map(lambda x: jnp.broadcast_to(x, (3, *jnp.shape(x))), state)
+    three = replace_albedo(three, jnp.array([0.1, 0.2, 0.3]))
+    prior = vector.prior(three)
+    assert prior.x_prior.shape == (3, 3)
+    values = vector.values(jnp.asarray(prior.x_prior))
+    np.testing.assert_allclose(values["albedo_C01"], [0.1, 0.2, 0.3], rtol=ROUNDING)
+    np.testing.assert_allclose(values["aod_550"], 0.4, rtol=ROUNDING)
+    with pytest.raises(ValueError, match="prior of albedo_C01 is that of states"):
+        vector.prior()
+
+
+def replace_albedo(state, values):
+    return StateVector((albedo("C01"),)).state(Bounded(0.0, 1.0).x(values)[:, None], state)
 
 
 def test_the_whitened_prior_measures_departures_by_their_covariance():
@@ -83,3 +205,21 @@ def test_the_whitened_prior_measures_departures_by_their_covariance():
     residual = Prior(jnp.asarray(x_prior), jnp.asarray(covariance)).residual(jnp.asarray(x))
     expected = (x - x_prior) @ np.linalg.solve(covariance, x - x_prior)
     np.testing.assert_allclose(np.sum(residual**2), expected, rtol=ROUNDING)
+
+
+def test_a_prior_fits_its_state_vector():
+    names = plume("smoke", ssa=True).names
+    fine = Prior(np.zeros(2), np.eye(2)).of_pixels(5, names)
+    assert fine.x_prior.shape == (5, 2) and fine.S_prior.shape == (5, 2, 2)
+    fine = Prior(np.zeros((5, 2)), np.eye(2)).of_pixels(5, names)
+    assert fine.x_prior.shape == (5, 2)
+    with pytest.raises(ValueError, match=r"x_prior has the shape \(1,\).*aod_550, ssa_shift"):
+        Prior(np.zeros(1), np.eye(2)).of_pixels(5, names)
+    with pytest.raises(ValueError, match=r"S_prior has the shape \(2,\)"):
+        Prior(np.zeros(2), np.ones(2)).of_pixels(5, names)
+    with pytest.raises(ValueError, match=r"x_prior has the shape \(4, 2\)"):
+        Prior(np.zeros((4, 2)), np.eye(2)).of_pixels(5, names)
+    with pytest.raises(ValueError, match="not symmetric"):
+        Prior(np.zeros(2), np.array([[1.0, 0.5], [0.0, 1.0]])).of_pixels(5, names)
+    with pytest.raises(ValueError, match="eigenvalue of -1"):
+        Prior(np.zeros(2), np.diag([1.0, -1.0])).of_pixels(5, names)

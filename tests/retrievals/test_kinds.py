@@ -60,7 +60,8 @@ def test_times_and_refusals_keep_their_places(simulated):
     times = np.array(["2007-10-23T18:00", "2007-10-23T19:00"], "datetime64[ns]")
     broken = simulated.copy(deep=True)
     broken["quality_flag"][0, 1] = QUALITY_FLAGS["night"]
-    broken["reflectance_factor"][0, 2, 2] = np.nan
+    broken["reflectance_factor"][:, 2, 2] = np.nan
+    broken["reflectance_factor"][0, 0, 2] = np.nan  # one band of three: it is left out
     both = xr.concat([simulated, broken], xr.DataArray(times, dims="time", name="time"))
     for name in simulated.data_vars:
         if "y" not in simulated[name].dims:
@@ -71,6 +72,8 @@ def test_times_and_refusals_keep_their_places(simulated):
     assert codes[1, 0, 1] == ResultCode.UNUSABLE and codes[1, 2, 2] == ResultCode.INVALID_INPUT
     assert np.isnan(retrieval["aod_550"].values[1, 0, 1])
     assert retrieval["num_steps"].values[1, 0, 1] == 0
+    num_values = retrieval["num_values"].values
+    assert num_values[1, 0, 2] == 2 and num_values[0, 0, 2] == 3
     codes[1, 0, 1], codes[1, 2, 2] = codes[0, 0, 1], codes[0, 2, 2]
     np.testing.assert_array_equal(codes[0], codes[1])
     np.testing.assert_array_equal(retrieval["time"], times)

@@ -1,0 +1,240 @@
+"""Retrievals against the known truth: closure, calibration, speed.
+
+    python benchmarks/retrievals_against_truth.py [--pixels 512] [--streams 8] [--only NAMES]
+
+Random pixels of `benchmarks/retrievals_pixels.py`: clear air of 20 layers, everything a pixel's own
+(sun to 75 degrees, view to 70, albedo 0.01 to 0.4 in every band). Float64. Names are closure, fire,
+calibration and speed; without any all run, in some five minutes for 1,024 pixels on two cores.
+
+- closure: no noise and no prior, from C01 C02 C03; aod_550 0.05 to 4, ssa 0.80 to 0.99 in C01,
+  effective radius over the most of a table. Printed are the shares of pixels whose optical depth is
+  right within 1e-3 at the solution, and at it or the second solution; whose brf fits within 1e-9;
+  and that are coded as having multiple solutions.
+- fire closure: C05 C06 C07, 450 to 1,200 K, fraction 1e-4 to 0.04, by day, unsaturated pixels.
+- calibration: truth drawn from the prior (0.7 in ln aod, 0.5 in the logit of ssa), the imager's
+  noise; a pixel that did not converge is not covered. The linearity test is that of
+  `optimal_estimation`. In bins of the true optical depth coverage need not be that of all: a prior
+  pulls the extremes inwards.
+- speed: three unknowns of smoke from C01 C02 C03 with noise and prior, compiling apart; only pixels
+  that agree with a tight solve within 0.1 posterior sigma count.
+"""
+
+import argparse
+import time
+
+import jax
+import numpy as np
+from retrievals_pixels import random_states
+
+from abi_operator import Atmosphere, Fire, LiquidCloud, State
+from abi_operator.machine.speed import use_compilation_cache, use_compiler_flags
+from retrievals import (
+    ForwardModel,
+    Minimiser,
+    Observation,
+    Prior,
+    ResultCode,
+    measurement,
+    prepared,
+    retrieve_pixels,
+)
+from retrievals.declarations import fire, plume
+from retrievals.optimal_estimation import LARGEST_NONLINEARITY, estimates
+
+BANDS = ("C01", "C02", "C03")
+SECONDS = "seconds for all, compiling too"
+RADII = {"smoke": (0.08, 0.3), "ash": (0.6, 8.0)}
+
+
+def percent(chosen):
+    return f"{100 * np.mean(chosen):.2f}"
+
+
+def truth_of(rng, states, species, names):
+    """True values of the quantities of a plume, by name."""
+    n = len(states.geometry.solar_zenith)
+    ssa, known = rng.uniform(0.80, 0.99, n), states.atmosphere.plumes[species].ssa["C01"]
+    values = {
+        "aod_550": np.exp(rng.uniform(np.log(0.05), np.log(4), n)),
+        "ssa_shift": np.log(ssa / (1 - ssa)) - np.log(known / (1 - known)),
+        "effective_radius_um": np.exp(rng.uniform(*np.log(RADII[species]), n)),
+    }
+    return [values[name] for name in names]
+
+
+def closure(num_pixels, streams):
+    heads = "| retrieved | aod, first | aod, either | brf 1e-9 | multiple | steps | " + SECONDS
+    print(f"\nshares of {num_pixels} pixels [%]:\n\n{heads} |\n|{' --- |' * 7}")
+    for species, ssa, radius in (
+        ("smoke", False, False),
+        ("smoke", True, False),
+        ("ash", True, False),
+        ("smoke", True, True),
+    ):
+        rng = np.random.default_rng(7)
+        states = random_states(rng, num_pixels, BANDS, species)
+        vector = plume(species, ssa=ssa, effective_radius=radius)
+        truth = truth_of(rng, states, species, vector.names)
+        forward = prepared(ForwardModel(vector, BANDS, streams, gases=()), states)
+        seen = np.asarray(forward(vector.x(*truth), states))
+        sigma = measurement(seen, BANDS).sigma
+        start = time.perf_counter()
+        found = retrieve_pixels(forward, Observation(seen, sigma), states, exact=True)
+        seconds = time.perf_counter() - start
+        aod = [np.asarray(vector.values(s.x)["aod_550"]) for s in (found.inversion, found.other)]
+        wrong = [np.abs(x - truth[0]) for x in aod]
+        departure = np.abs(np.asarray(forward(found.inversion.x, states)) - seen)
+        departure /= np.cos(states.geometry.solar_zenith)[:, None]
+        cells = (
+            percent(wrong[0] <= 1e-3),
+            percent(np.minimum(*wrong) <= 1e-3),
+            percent(departure.max(axis=1) <= 1e-9),
+            percent(found.codes == ResultCode.MULTIPLE_SOLUTIONS),
+            f"{np.mean(found.inversion.num_steps):.1f}",
+            f"{seconds:.0f}",
+        )
+        label = f"{species}: {', '.join(vector.names)}"
+        print(f"| {label} | {' | '.join(cells)} |", flush=True)
+
+
+def fire_closure(num_pixels, streams):
+    rng, bands = np.random.default_rng(9), ("C05", "C06", "C07")
+    clear = random_states(rng, num_pixels, bands)
+    air, n = clear.atmosphere, num_pixels
+    temperature = np.linspace(210.0, 295.0, air.pressure.shape[1]) + rng.uniform(-8, 8, (n, 1))
+    air = Atmosphere(
+        air.pressure,
+        air.height,
+        LiquidCloud(air.liquid.mass_path, air.liquid.number_path),
+        {},
+        temperature=temperature,
+    )
+    truth = rng.uniform(450, 1200, n), np.exp(rng.uniform(np.log(1e-4), np.log(0.04), n))
+    burning = Fire(np.full(n, 0.01), np.full(n, 700.0))
+    states = State(air, clear.albedo, clear.geometry, temperature[:, -1] + 3, burning)
+    vector = fire()
+    forward = prepared(ForwardModel(vector, bands, streams, gases=()), states)
+    observation = measurement(forward(vector.x(*truth), states), bands)
+    start = time.perf_counter()
+    found = retrieve_pixels(forward, observation, states, exact=True)
+    seconds = time.perf_counter() - start
+    fine = ~np.asarray(observation.saturated).any(axis=1)
+    values = vector.values(found.inversion.x)
+    kelvin = np.abs(np.asarray(values["fire_temperature"]) - truth[0])[fine]
+    share = np.abs(np.asarray(values["fire_fraction"]) / truth[1] - 1)[fine]
+    print(
+        f"\nfires, {fine.sum()} unsaturated pixels: {percent((kelvin <= 0.1) & (share <= 1e-3))} % "
+        f"within 0.1 K and 0.1 % of the fraction; {SECONDS}: {seconds:.0f}"
+    )
+
+
+def with_prior(num_pixels, streams, names):
+    """Noisy observations of pixels drawn from a prior."""
+    rng = np.random.default_rng(2)
+    states = random_states(rng, num_pixels, BANDS)
+    how = {"ssa": "ssa_shift" in names, "effective_radius": "effective_radius_um" in names}
+    vector = plume("smoke", **how)
+    mean = {"aod_550": 0.4, "ssa_shift": 0.0, "effective_radius_um": 0.14}
+    spread = {"aod_550": 0.7, "ssa_shift": 0.5, "effective_radius_um": 0.5}
+    prior = Prior(
+        np.asarray(vector.x(*(mean[name] for name in names))),
+        np.diag([spread[name] ** 2 for name in names]),
+    )
+    x = prior.x_prior + rng.standard_normal((num_pixels, len(names))) @ np.sqrt(prior.S_prior)
+    forward = prepared(ForwardModel(vector, BANDS, streams, gases=()), states)
+    seen = np.asarray(forward(x, states))
+    # The noise of the truth, which the retrieval takes from what was measured.
+    noisy = seen + measurement(seen, BANDS).sigma * rng.standard_normal(seen.shape)
+    return forward, measurement(noisy, BANDS), states, prior, x
+
+
+def calibration(num_pixels, streams):
+    names = ("aod_550", "ssa_shift")
+    forward, observation, states, prior, truth = with_prior(num_pixels, streams, names)
+    found = retrieve_pixels(forward, observation, states, prior=prior)
+    inversion = found.inversion
+    diagnosed = estimates(forward, observation, states, inversion.x, prior)
+    linear = diagnosed.nonlinearity <= LARGEST_NONLINEARITY
+    sigma = np.sqrt(np.diagonal(diagnosed.posterior_covariance, axis1=1, axis2=2))
+    ratio = np.abs(inversion.x - truth) / sigma
+    ratio[~inversion.converged] = np.inf
+    print(
+        f"\ncalibration, {num_pixels} pixels of smoke with noise and prior: "
+        f"{percent(inversion.converged)} % converged, mean of cost / m "
+        f"{np.mean(inversion.cost) / len(BANDS):.3f}, linear {percent(linear)} %\n\n"
+        f"| pixels | quantity | within 1 sigma [%] | within 1.96 sigma [%] |\n|{' --- |' * 4}"
+    )
+    aod = np.asarray(forward.vector.values(truth)["aod_550"])
+    bins = [("all", np.ones(num_pixels, bool)), ("linear", linear)]
+    bins += [
+        (f"linear, aod {low:g} to {high:g}", linear & (aod > low) & (aod <= high))
+        for low, high in ((0, 0.2), (0.2, 0.5), (0.5, 1), (1, 10))
+    ]
+    for label, rows in bins:
+        error = 100 * np.sqrt(0.683 * 0.317 / max(rows.sum(), 1))
+        for i, name in enumerate(names):
+            one, two = (percent(ratio[rows, i] <= k) for k in (1.0, 1.96))
+            print(f"| {label} ({rows.sum()}) | {name} | {one} +- {error:.1f} | {two} |")
+
+
+def speed(num_pixels, streams):
+    names = ("aod_550", "ssa_shift", "effective_radius_um")
+    forward, observation, states, prior, _ = with_prior(num_pixels, streams, names)
+
+    def timed(how):
+        start = time.perf_counter()
+        retrieve_pixels(forward, observation, states, prior=prior, minimiser=how)
+        first = time.perf_counter() - start
+        seconds = []
+        for _ in range(3):
+            start = time.perf_counter()
+            found = retrieve_pixels(forward, observation, states, prior=prior, minimiser=how)
+            seconds.append(time.perf_counter() - start)
+        return found.inversion, min(seconds), first
+
+    start = time.perf_counter()
+    forward(np.asarray(prior.x_prior) + np.zeros((num_pixels, 1)), states)
+    start = time.perf_counter()
+    jax.block_until_ready(forward(prior.x_prior + np.zeros((num_pixels, 1)), states))
+    value = time.perf_counter() - start
+    tight = retrieve_pixels(
+        forward, observation, states, prior=prior, minimiser=Minimiser(1e-5, 80, starts="prior")
+    ).inversion
+    sigma = np.sqrt(np.diagonal(tight.covariance, axis1=1, axis2=2))
+    print(
+        f"\nspeed, {num_pixels} pixels, three unknowns, {streams} streams; the operator alone "
+        f"makes {num_pixels / value:.0f} pixels/s\n\n| solver | starts | steps | right [%] "
+        f"| right pixels/s | first answer [s] |\n|{' --- |' * 6}"
+    )
+    for solver in ("dogleg", "levenberg_marquardt"):
+        for starts in ("prior", "scan"):
+            found, seconds, first = timed(Minimiser(solver=solver, starts=starts))
+            right = found.converged & (np.abs(found.x - tight.x) <= 0.1 * sigma).all(axis=1)
+            print(
+                f"| {solver} | {starts} | {np.mean(found.num_steps):.1f} | {percent(right)} | "
+                f"{right.sum() / seconds:.0f} | {first - seconds:.0f} |",
+                flush=True,
+            )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--pixels", type=int, default=512)
+    parser.add_argument("--streams", type=int, default=8)
+    parser.add_argument("--only", default="closure,fire,calibration,speed")
+    arguments = parser.parse_args()
+    use_compiler_flags()
+    use_compilation_cache()
+    jax.config.update("jax_enable_x64", True)
+    studies = {
+        "closure": closure,
+        "fire": fire_closure,
+        "calibration": calibration,
+        "speed": speed,
+    }
+    for name in arguments.only.split(","):
+        studies[name](arguments.pixels, arguments.streams)
+
+
+if __name__ == "__main__":
+    main()

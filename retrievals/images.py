@@ -1,0 +1,192 @@
+"""Retrievals from the result of a simulation: a Dataset in, a Dataset out."""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import jax
+import numpy as np
+import xarray as xr
+
+from abi_operator import State
+from abi_operator.bands import check_bands
+from abi_operator.files import InputError
+from abi_operator.instrument import IMAGER
+from abi_operator.nomenclature import PLUME, SCENARIO
+from abi_operator.scene import column_states, gases_of
+
+from .forward import ForwardModel, prepared
+from .inverse import DEFAULT_MINIMISER, Minimiser
+from .observation import Observation, add_noise, observe, usable
+from .optimal_estimation import estimates
+from .pixels import retrieve_pixels
+from .prior import Prior
+from .product import diagnostic_fields, make_product, pixel_fields
+from .results import ResultCode
+from .state_vector import StateVector
+
+REFLECTIVE = ("C01", "C02", "C03", "C04", "C05", "C06")
+"""Bands of which a result can be retrieved from."""
+
+
+def retrieve_image(
+    dataset: xr.Dataset,
+    vector: StateVector,
+    *,
+    bands: Sequence[str],
+    species: str | None = None,
+    where: Literal["plume", "cloud", "all"] = "plume",
+    noise: bool = False,
+    seed: int = 0,
+    prior: Prior | StateVector | None = None,
+    assumed: StateVector | None = None,
+    diagnostics: bool = False,
+    num_streams: int | None = None,
+    minimiser: Minimiser = DEFAULT_MINIMISER,
+    attributes: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Retrieve a state vector from the result of a simulation, pixel by pixel, in float64.
+
+    Whatever is not retrieved (ground, cloud, air and its gases, height and spectrum of a plume) is
+    known from the scenario in the result. Brightness of the plume serves as its mask; what is
+    retrieved is not looked at.
+
+    Parameters
+    ----------
+    dataset
+        A result with dimensions y and x, and time if there are several; of `scene.simulate` or
+        `files.read_result`.
+    vector
+        What to retrieve.
+    bands
+        Bands to be used, of C01 to C06. Where one is not finite it is left out.
+    species
+        Name of the plume that is retrieved, None if none is.
+    where
+        ``"plume"``: where the plume's brightness is above 0; ``"cloud"``: where there is cloud
+        water; ``"all"``: at every usable pixel, where those without plume end as ``not_converged``
+        unless there is a prior.
+    noise, seed
+        Whether to add noise (`observation.add_noise`) to the reflectances, and its seed. Without
+        noise a fit has to be exact; posterior errors are those that noise would cause.
+    prior
+        What is known of x beforehand, of all pixels; a state vector stands for what its quantities
+        declare (``prior=vector``).
+    assumed
+        What is not retrieved, for the diagnostics: errors due to it, as it is declared.
+    diagnostics
+        Whether to add matrices and errors of `optimal_estimation` to the product.
+    num_streams
+        Streams of the solver; None for those of the simulation.
+    minimiser
+        How, and when to end.
+    attributes
+        Global attributes of the product beside those of its making.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``result_code``, which has to be 0 where the rest is used; each quantity of the state
+        vector, its posterior standard deviation ``_sigma`` and its value at a second solution
+        ``_second``; what is derived of them; ``cost`` and its parts ``measurement_cost`` and
+        ``prior_cost``, ``degrees_of_freedom``, ``num_values`` and ``num_steps``. As diagnostics
+        ``averaging_kernel``, ``posterior_covariance`` and ``gain`` of x, ``residual``,
+        ``information_content``, ``nonlinearity``, and of each quantity its ``_noise_error``,
+        ``_smoothing_error`` and ``_error_due_to_`` what is assumed.
+
+    Raises
+    ------
+    InputError
+        Where the Dataset lacks a variable or a band.
+    """
+    bands = check_bands(bands, REFLECTIVE)
+    _check(dataset, bands, species, vector.size, prior)
+    if num_streams is None:
+        num_streams = int(dataset.attrs.get("num_streams", 8))
+    with jax.enable_x64(True):
+        if noise:
+            noisy = add_noise(dataset["reflectance_factor"], seed)
+            dataset = dataset.assign(reflectance_factor=noisy)
+        images = _images(dataset)
+        codes = np.stack([usable(image, bands, species, where) for image in images])
+        attempted = codes == ResultCode.SUCCESS
+        fields = {}
+        if attempted.any():
+            observations, states = _gather(images, attempted, bands)
+            satellite = str(dataset.attrs.get("satellite", IMAGER.satellite))
+            forward = ForwardModel(
+                vector, bands, num_streams, gases=gases_of(dataset), satellite=satellite
+            )
+            forward = prepared(forward, states)
+            of_x = prior.prior(states) if isinstance(prior, StateVector) else prior
+            retrieved = retrieve_pixels(
+                forward,
+                observations,
+                states,
+                prior=of_x,
+                minimiser=minimiser,
+                exact=not noise and prior is None,
+            )
+            fields = pixel_fields(vector, retrieved, states, observations.num_values)
+            if diagnostics:
+                x = np.asarray(retrieved.inversion.x)
+                found = estimates(forward, observations, states, x, of_x, assumed)
+                fields |= diagnostic_fields(vector, x, found, assumed)
+            codes[attempted] = retrieved.codes
+    about = {
+        "bands": " ".join(bands),
+        "num_streams": num_streams,
+        "noise": f"added with seed {seed}" if noise else "none",
+        "prior": "none" if prior is None else "normal distribution",
+    }
+    about |= {} if species is None else {"species": species}
+    about |= attributes or {}
+    return make_product(dataset, codes, attempted, fields, (bands, vector.names), about)
+
+
+def _check(
+    dataset: xr.Dataset,
+    bands: tuple[str, ...],
+    species: str | None,
+    num_unknowns: int,
+    prior: object,
+) -> None:
+    """Raise `InputError` for what the Dataset lacks."""
+    of_plume = [] if species is None else [f"{species}_{name}" for name in PLUME]
+    required = ("reflectance_factor", *SCENARIO, *of_plume)
+    missing = [name for name in required if name not in dataset.variables]
+    if missing:
+        plume = "" if species is None else f" with a plume of {species}"
+        option = "" if species is None else "with --plume, and "
+        raise InputError(
+            f"the result has no {', '.join(missing)}; simulate a scene{plume}, and "
+            f"keep all of it (abi-operator simulate {option}without --variables)."
+        )
+    lacking = sorted(set(bands) - set(dataset["band"].values.tolist()))
+    if lacking:
+        raise InputError(
+            f"the result has no band {', '.join(lacking)}; simulate it, or choose other bands."
+        )
+    if prior is None and len(bands) < num_unknowns:
+        raise InputError(
+            f"{num_unknowns} unknowns need as many bands, or a prior; got {', '.join(bands)}."
+        )
+
+
+def _images(dataset: xr.Dataset) -> list[xr.Dataset]:
+    """The times of a Dataset."""
+    if "time" not in dataset.dims:
+        return [dataset]
+    return [dataset.isel(time=time) for time in range(dataset.sizes["time"])]
+
+
+def _gather(
+    images: list[xr.Dataset], attempted: np.ndarray, bands: tuple[str, ...]
+) -> tuple[Observation, State]:
+    """Measurements and states of the pixels to be attempted, pixels of all times in one row."""
+    parts = []
+    for image, chosen in zip(images, attempted, strict=True):
+        if chosen.any():
+            y, x = (xr.DataArray(index, dims="column") for index in np.nonzero(chosen))
+            columns = image.isel(y=y, x=x)
+            parts.append((observe(columns, bands), column_states(columns, bands)))
+    return jax.tree.map(lambda *arrays: np.concatenate(arrays), *parts)

@@ -1,0 +1,115 @@
+"""What the command retrieves, by name: a state vector, its bands and where it is looked for."""
+
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
+
+import xarray as xr
+
+from .declarations import AOD_LIMIT, assumed_of_plume, liquid_cloud, plume
+from .images import retrieve_image
+from .state_vector import StateVector
+
+BANDS = ("C01", "C02", "C03")
+"""Bands that are used by default for smoke: in C06, it is hardly seen."""
+
+
+class Kind(NamedTuple):
+    """Defaults of a retrieval.
+
+    Parameters
+    ----------
+    bands
+        Bands that tell of it.
+    species
+        Name of the plume in a scenario, None for cloud.
+    """
+
+    bands: tuple[str, ...]
+    species: str | None
+
+
+KINDS = {
+    "smoke": Kind(BANDS, "smoke"),
+    "ash": Kind(BANDS, "ash"),
+    "dust": Kind(BANDS, "dust"),
+    "cloud": Kind(("C02", "C06"), None),
+}
+"""Retrievals from the result of a simulation, which holds no fires: those are retrieved by
+`retrieve_pixels` from `declarations.fire`."""
+
+
+def retrieve_kind(
+    dataset: xr.Dataset,
+    kind: str,
+    *,
+    bands: Sequence[str] | None = None,
+    retrieve_ssa: bool = False,
+    effective_radius: bool = False,
+    aod_limit: float = AOD_LIMIT,
+    where: Literal["plume", "cloud", "all"] | None = None,
+    **how: Any,
+) -> xr.Dataset:
+    """Retrieve one of `KINDS` from the result of a simulation.
+
+    Parameters
+    ----------
+    dataset, **how
+        As of `retrieve_image`.
+    kind
+        One of `KINDS`.
+    bands
+        Bands to be used; None for those of the kind.
+    retrieve_ssa
+        Whether a plume's single-scattering albedo is unknown too, by one shift of its logit in all
+        bands.
+    effective_radius
+        Whether the effective radius of its particles is. Of cloud it always is.
+    aod_limit
+        Optical depths of a plume from here on are out of reach. [-]
+    where
+        As of `retrieve_image`; None for where there is a plume, or cloud.
+    """
+    chosen = KINDS[kind]
+    bands = chosen.bands if bands is None else tuple(bands)
+    vector = vector_of(kind, retrieve_ssa, effective_radius, aod_limit)
+    species = chosen.species
+    about: dict[str, Any] = {
+        "title": f"{kind.capitalize()} retrieved from synthetic imagery",
+        "kind": kind,
+        "retrieved": " ".join(vector.names),
+    }
+    if species is not None:
+        about["aod_limit"] = aod_limit
+        how.setdefault("assumed", assumed_of_plume(species, bands))
+    where = where or ("cloud" if species is None else "plume")
+    return retrieve_image(
+        dataset, vector, bands=bands, species=species, where=where, attributes=about, **how
+    )
+
+
+def vector_of(
+    kind: str,
+    retrieve_ssa: bool = False,
+    effective_radius: bool = False,
+    aod_limit: float = AOD_LIMIT,
+) -> StateVector:
+    """State vector of one of `KINDS`; parameters are those of `retrieve_kind`.
+
+    Raises
+    ------
+    ValueError
+        Where cloud is to have a single-scattering albedo that is retrieved.
+    """
+    species = KINDS[kind].species
+    if species is not None:
+        return plume(
+            species, ssa=retrieve_ssa, effective_radius=effective_radius, aod_limit=aod_limit
+        )
+    if retrieve_ssa:
+        raise ValueError("the single-scattering albedo of cloud is that of water.")
+    return liquid_cloud()
+
+
+def retrieve_smoke(dataset: xr.Dataset, **how: Any) -> xr.Dataset:
+    """Retrieve smoke: optical depth, and if wished how much it absorbs (`retrieve_kind`)."""
+    return retrieve_kind(dataset, "smoke", **how)

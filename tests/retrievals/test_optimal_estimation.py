@@ -1,0 +1,96 @@
+"""Diagnostics against their formulas, by NumPy."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from veil import TWO, VEIL, veiled_pixels
+
+from retrievals import Bounded, Observation, Prior, Quantity, StateVector
+from retrievals.optimal_estimation import estimates
+from retrievals.quantities import replaced
+
+EXACT = 1e-10
+
+
+class GroundOf(StateVector):
+    """The veil's ground, which is no state but an array: one number for all bands."""
+
+    def state(self, x, state):
+        return state + self.quantities[0].transform.value(x)
+
+    def held(self, state, name):
+        return jnp.zeros(len(state))
+
+
+GROUND = GroundOf(
+    (Quantity("ground", "1", "ground", "", Bounded(-1.0, 1.0), replaced, sigma=0.02, mean=0.0),)
+)
+
+
+@pytest.fixture(scope="module")
+def diagnosed():
+    """Estimates of pixels of which one has a missing band, and what they were made of."""
+    observation, ground, truth = veiled_pixels()
+    sigma = observation.sigma.copy()
+    sigma[3, 1] = np.inf
+    observation = Observation(observation.measured, sigma)
+    x = np.asarray(TWO.vector.x(truth, 0.01)) + 0.05
+    prior = Prior(np.array([-2.5, 0.0]), np.array([[0.8, 0.01], [0.01, 0.0025]]))
+    return estimates(TWO, observation, ground, x, prior, GROUND), observation, ground, x, prior
+
+
+@pytest.mark.parametrize("index", [0, 3, 11])
+def test_diagnostics_are_their_formulas(diagnosed, index):
+    """Rodgers (2000), sections 2.3 to 2.5 and 3.2, with all matrices written out."""
+    found, observation, ground, x, prior = diagnosed
+    one = jax.tree.map(lambda leaf: leaf[index], found)
+    counts = np.isfinite(observation.sigma[index])
+    K = np.asarray(jax.jacfwd(lambda x: TWO(x, ground[index]))(jnp.asarray(x[index])))[counts]
+    S_obs = np.diag(observation.sigma[index][counts] ** 2)
+    S_prior = prior.S_prior
+    S_hat = np.linalg.inv(K.T @ np.linalg.inv(S_obs) @ K + np.linalg.inv(S_prior))
+    G = S_hat @ K.T @ np.linalg.inv(S_obs)
+    A = G @ K
+    np.testing.assert_allclose(one.jacobian[counts], K, rtol=EXACT)
+    np.testing.assert_allclose(one.posterior_covariance, S_hat, rtol=EXACT)
+    np.testing.assert_allclose(one.gain[:, counts], G, rtol=EXACT)
+    assert (one.gain[:, ~counts] == 0).all() and (one.residual[~counts] == 0).all()
+    np.testing.assert_allclose(one.averaging_kernel, A, rtol=EXACT)
+    np.testing.assert_allclose(one.degrees_of_freedom, np.trace(A), rtol=EXACT)
+    information = 0.5 * np.log2(np.linalg.det(S_prior @ np.linalg.inv(S_hat)))
+    np.testing.assert_allclose(one.information_content, information, rtol=EXACT)
+    np.testing.assert_allclose(one.noise_covariance, G @ S_obs @ G.T, rtol=EXACT)
+    lack = A - np.eye(2)
+    smoothing = lack @ S_prior @ lack.T
+    rounding = 1e-9 * np.abs(S_hat).max()  # a difference of nearly equal numbers
+    np.testing.assert_allclose(one.smoothing_covariance, smoothing, atol=rounding)
+    np.testing.assert_allclose(
+        one.noise_covariance + one.smoothing_covariance, one.posterior_covariance, rtol=EXACT
+    )
+    departure = (TWO(jnp.asarray(x[index]), ground[index]) - observation.measured[index])[counts]
+    chi_square = departure @ np.linalg.inv(S_obs) @ departure
+    np.testing.assert_allclose(one.chi_square, chi_square, rtol=EXACT)
+    # dF / d ground is the transmittance; the transform's slope at 0 is 1 / 2
+    lit, dark = (np.asarray(TWO(jnp.asarray(x[index]), ground[index] + a)) for a in (1, 0))
+    transmittance = lit - dark
+    error = np.abs(G @ transmittance[counts] * 0.5) * 0.02
+    np.testing.assert_allclose(one.parameter_error[0], error, rtol=1e-9)
+
+
+def test_the_linearity_test_sees_curvature(diagnosed):
+    found, observation, ground, x, _ = diagnosed
+    variances, axes = np.linalg.eigh(found.posterior_covariance[0])
+    here, departures = np.asarray(TWO(jnp.asarray(x[0]), ground[0])), []
+    for step in [*(axes * np.sqrt(variances)).T, *-(axes * np.sqrt(variances)).T]:
+        moved = np.asarray(TWO(jnp.asarray(x[0] + step), ground[0]))
+        linear = here + found.jacobian[0] @ step
+        departures.append(np.sum(((moved - linear) / observation.sigma[0]) ** 2))
+    np.testing.assert_allclose(found.nonlinearity[0], max(departures), rtol=1e-6)
+
+
+def test_without_a_prior_the_kernel_is_the_unit_matrix(diagnosed):
+    _, observation, ground, x, _ = diagnosed
+    found = estimates(VEIL, observation, ground, x[:, :1])
+    np.testing.assert_allclose(found.averaging_kernel, 1, rtol=EXACT)
+    assert np.isinf(found.information_content).all() and found.parameter_error.shape == (12, 0, 1)
