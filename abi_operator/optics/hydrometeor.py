@@ -15,7 +15,7 @@ from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
 from . import rain, water
 from .anomalous_diffraction import Matter, matter, mean_efficiencies
-from .cloud import liquid_cloud
+from .cloud import fitted_radii_um, liquid_cloud
 from .droplets import LARGEST_RADIUS, NU, SMALLEST_RADIUS, effective_radius
 from .gamma import Habit, equivalent_shape, mean_mass_of_path, photon_path, sphere_habit
 from .ice import (
@@ -200,8 +200,9 @@ def outside_fitted_range(
 ) -> Float[Array, ""]:
     """Fraction of the optical depth of hydrometeors whose size is beyond what was fitted. [-]
 
-    Fitted are effective radii of 2-50 um for droplets, 20-2000 um for rain, and generalized
-    effective sizes of 20-130 um for ice by Fu (1996). Where the asymmetry factor is a given number
+    Fitted are effective radii of 1.74-59 um for the liquid cloud by Mie theory and 2-50 um for one
+    by ``"mitchell"`` and the class of that kind, 20-2000 um for rain, and generalized effective
+    sizes of 20-130 um for ice by Fu (1996). Where the asymmetry factor is a given number
     just the limits of the class count.
 
     Parameters
@@ -211,7 +212,7 @@ def outside_fitted_range(
     """
     cloud = liquid_cloud(atmosphere, band).tau[0]
     radius_um = 1e6 * effective_radius(atmosphere.liquid)
-    smallest, largest = water.EFFECTIVE_RADIUS_UM[0], water.EFFECTIVE_RADIUS_UM[-1]
+    smallest, largest = fitted_radii_um(atmosphere.liquid)
     total = jnp.sum(cloud)
     outside = jnp.sum(jnp.where((radius_um < smallest) | (radius_um > largest), cloud, 0))
     for name in sorted(atmosphere.hydrometeors):

@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 
 from abi_operator import smoke
+from abi_operator.files import InputError
 from abi_operator.scene import PlumeSpecification, column_states, scenario
 
 BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
@@ -35,6 +36,17 @@ def test_a_state_holds_what_the_scenario_says_of_its_column(made):
     plume = state.atmosphere.plumes["smoke"]
     np.testing.assert_allclose(plume.aod_550, 1.2 * BRIGHTNESS[1, 1])
     assert plume.ssa["C06"] == made["smoke_ssa"].sel(band="C06")
+
+
+def test_a_cloud_scatters_as_the_scenario_or_its_result_says(made):
+    def optics(dataset):
+        return column_states(dataset, ("C01",)).atmosphere.liquid.optics
+
+    assert optics(made) == "mie"
+    assert optics(made.assign_attrs(cloud_optics="mitchell")) == "mitchell"
+    assert optics(made.drop_attrs(deep=False)) == "mie"
+    with pytest.raises(InputError, match="cloud optics 'fu' are not known"):
+        optics(made.assign_attrs(cloud_optics="fu"))
 
 
 def test_a_state_has_the_gases_temperatures_and_particles_of_the_scenario(make_model):
