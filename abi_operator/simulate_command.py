@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .atmosphere import LIQUID_OPTICS
+from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence, typed, user_warnings
 from .files import output_folder
@@ -146,6 +146,14 @@ def simulate(
             "modified anomalous diffraction, without a rainbow.",
         ),
     ] = LIQUID_OPTICS[0],
+    ice_optics: Annotated[
+        str,
+        typer.Option(
+            metavar=" | ".join(ICE_OPTICS),
+            help="How strongly crystals of ice scatter forwards: as Fu's smooth columns, or as "
+            "severely roughened crystals of many habits.",
+        ),
+    ] = ICE_OPTICS[0],
     satellite: Annotated[
         str, typer.Option(help=f"Whose imager looks: {', '.join(SATELLITES)}.")
     ] = "GOES-16",
@@ -231,6 +239,7 @@ def simulate(
         microphysics=microphysics,
         droplet_number=droplets,
         cloud_optics=cloud_optics,
+        ice_optics=ice_optics,
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=num_streams,

@@ -41,6 +41,7 @@ from .scene import (
     check_gases,
     check_ground,
     check_ice_albedo,
+    check_ice_optics,
     check_land_albedo,
     check_microphysics,
     check_sight,
@@ -109,6 +110,7 @@ def open_scene(request: Request) -> Scene:
     check_classes(request.hydrometeors or ())
     check_microphysics(request.microphysics)
     check_cloud_optics(request.cloud_optics)
+    check_ice_optics(request.ice_optics)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
     check_variables(request.variables)
@@ -191,6 +193,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         microphysics=request.microphysics,
         droplet_number=request.droplet_number,
         cloud_optics=request.cloud_optics,
+        ice_optics=request.ice_optics,
         standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from ..atmosphere import LIQUID_OPTICS
+from ..atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from ..bands import BANDS, GRASSO2013, check_bands
 from ..files import InputError
 from ..files.netcdf import cf_attributes
@@ -24,8 +24,7 @@ from .account import (
 from .albedo import surface_albedo
 from .angles import SATELLITE_LONGITUDE, angle_flags, find_angles
 from .checks import check_scenario
-from .cloud_optics import ATTRIBUTE as CLOUD_OPTICS
-from .cloud_optics import check_cloud_optics
+from .cloud_optics import check_cloud_optics, check_ice_optics, optics_attributes
 from .column_air import complete_air, completion_heights, highest_top
 from .droplet_number import DropletNumber
 from .emissivity import Emissivity
@@ -55,6 +54,7 @@ def scenario(
     microphysics: str | None = None,
     droplet_number: DropletNumber | None = None,
     cloud_optics: str = LIQUID_OPTICS[0],
+    ice_optics: str = ICE_OPTICS[0],
     standard_atmosphere: str | None = None,
     added_heights: Sequence[float] | None = None,
     rows: slice = slice(None),
@@ -105,6 +105,9 @@ def scenario(
     cloud_optics
         By which theory liquid cloud scatters: ``"mie"``, or ``"mitchell"`` for that of Grasso et
         al. (2013); see `LiquidCloud`.
+    ice_optics
+        Whose asymmetry factor crystals have: ``"fu"``, smooth columns, or ``"rough"``; see
+        `Hydrometeor`.
     standard_atmosphere
         Name of the one that gives ozone, and what is above the model; None for the nearest
         (`nearest_standard_atmosphere`). The blocks of a scene need the same.
@@ -126,11 +129,12 @@ def scenario(
     ------
     InputError
         Where albedo or emissivity is missing or does not cover the scene, a number of particles
-        cannot be assumed, the gases of a band are not known of the satellite, the cloud's optics
-        have no such name, or a value is out of its range.
+        cannot be assumed, the gases of a band are not known of the satellite, optics of
+        clouds have no such name, or a value is out of its range.
     """
     bands, gases = check_bands(bands), check_gases(tuple(gases))
     check_cloud_optics(cloud_optics)
+    check_ice_optics(ice_optics)
     check_absorption(satellite, bands, gases)
     if added_heights is None:
         added_heights = completion_heights(highest_top(model))
@@ -190,7 +194,7 @@ def scenario(
         "satellite": satellite,
         "satellite_longitude": satellite_longitude,
         "gases": gases_attribute(gases),
-        CLOUD_OPTICS: cloud_optics,
+        **optics_attributes(cloud_optics, ice_optics),
         "air_above_model": "US Standard Atmosphere 1976, scaled to the pressure at the model's top",
         "num_levels_above_model": len(added_heights),
         "assumed_droplet_number": condensate.droplets.number.describe(model),

@@ -401,6 +401,7 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--gases", "SO2"], "['SO2'] are not known"),
         (["--hydrometeors", "sleet"], "['sleet'] are not known"),
         (["--cloud-optics", "fu"], "cloud optics 'fu' are not known; choose from mie, mitchell"),
+        (["--ice-optics", "mie"], "ice optics 'mie' are not known; choose from fu, rough"),
         (["--microphysics", "p3"], "nothing is known of microphysics 'p3'"),
         (["--bands", "all"], "C07 needs the emissivity of the ground"),
         (["--bands", "C04", "--satellite", "GOES-19"], "is not known of GOES-19"),

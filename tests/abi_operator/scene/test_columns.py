@@ -61,7 +61,10 @@ def test_a_state_has_the_gases_temperatures_and_particles_of_the_scenario(make_m
     np.testing.assert_array_equal(state.atmosphere.temperature, column["temperature"])
     np.testing.assert_array_equal(state.surface_temperature, 300.0)
     np.testing.assert_allclose(state.albedo["C07"], 0.1)
+    rough = column_states(made.assign_attrs(ice_optics="rough"), ("C07",))
+    assert rough.atmosphere.hydrometeors["ice"].optics == "rough"
     particles = state.atmosphere.hydrometeors
+    assert particles["ice"].optics == "fu"
     assert list(particles) == ["ice"]
     np.testing.assert_array_equal(particles["ice"].mass_path, column["ice_mass_path"])
     np.testing.assert_array_equal(particles["ice"].number_path, column["ice_number_path"])
