@@ -6,7 +6,7 @@ Columns are those of `truth_columns`: clear, smoke, ash, dust, liquid, ice, mixe
 and fire, as many of each, in seven bands with all gases, sun to 78 and view to 73 degrees from the
 zenith. What a scene gives of them by default (`radiance`: sunlight, and emission in C07 and where
 there are fires) stands beside the same optics at many streams, with phase functions of Mie theory
-for droplets: their moments as many as streams need (65 for 64), and exact single scattering of the
+for droplets: their moments as many as streams need, and exact single scattering of the
 whole phase function. "Before" is the same with `--cloud-optics mitchell`, against the same truth.
 
 Errors are relative, in C01-C06 to no less than what a ground of albedo `FLOOR` would send up. Per
