@@ -89,11 +89,16 @@ class _Program(NamedTuple):
 
 
 class _Depths(NamedTuple):
-    """The same of the largest optical depth of any layer of a column, in any band. [-]"""
+    """The same of the largest optical depth of any layer of a column, in any band. [-]
+
+    Programs are found again by what they are, and tuples of the same entries are equal, of whatever
+    class: what is wanted is an entry, so that nobody who asks for a reflectance gets depths.
+    """
 
     structure: Any
     options: Options
     own_axes: tuple[int, ...]
+    wanted: str = "depths"
 
     def known(self, leaves: Leaves, what: Any) -> "_Depths":
         return self

@@ -98,3 +98,26 @@ def test_second_derivatives():
     )
     for second in (jax.jacfwd(jax.grad(of)), jax.jacrev(jax.grad(of))):
         np.testing.assert_allclose(jax.jit(second)(point), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_depths_that_are_read_are_no_reflectances(monkeypatch):
+    """One column, of which the value is asked for before its slopes, and after them.
+
+    Both read programs of the same state and settings: one that gives the largest optical depth, by
+    which slopes choose their doublings, and one that gives brf.
+    """
+    state = column(liquid=0.5, num_layers=2)
+
+    def value():
+        return brf(state, BANDS, **OPTIONS)
+
+    def slope():
+        return jax.jacrev(lambda s: brf(s, BANDS, **OPTIONS))(state).albedo["C01"]
+
+    found = []
+    for order in ((value, slope), (slope, value)):
+        programs_anew(monkeypatch)
+        found.append({ask.__name__: np.asarray(ask()) for ask in order})
+    for name in ("value", "slope"):
+        assert found[0][name].shape == (1,) and 0 < found[0][name][0] < 1
+        np.testing.assert_allclose(found[0][name], found[1][name], rtol=1e-12)
