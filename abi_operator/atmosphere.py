@@ -12,8 +12,10 @@ from jaxtyping import Array, Float
 
 from .geometry import Geometry
 
-LIQUID_OPTICS = ("mitchell", "mie")
-"""Ways to the optics of cloud droplets."""
+LIQUID_OPTICS = ("mie", "mitchell")
+"""Ways to the optics of cloud droplets, the default first."""
+ICE_OPTICS = ("fu", "rough")
+"""Crystals whose asymmetry factors those of ice are, the default first."""
 
 
 class LiquidCloud(eqx.Module):
@@ -26,8 +28,9 @@ class LiquidCloud(eqx.Module):
     number_path
         Number of droplets in the layer per horizontal area; read only where there is mass. [m-2]
     optics
-        Where their optics are from: ``"mitchell"``, modified anomalous diffraction and the phase
-        function of Henyey and Greenstein, or ``"mie"``, Mie theory by table.
+        Where their optics are from: ``"mie"``, Mie theory by table, with its rainbow and glory, or
+        ``"mitchell"``, that of Grasso et al. (2013): modified anomalous diffraction and the phase
+        function of Henyey and Greenstein.
 
     Raises
     ------
@@ -37,7 +40,7 @@ class LiquidCloud(eqx.Module):
 
     mass_path: Float[Array, "*batch layer"]
     number_path: Float[Array, "*batch layer"]
-    optics: str = eqx.field(default="mitchell", static=True)
+    optics: str = eqx.field(default=LIQUID_OPTICS[0], static=True)
 
     def __check_init__(self) -> None:
         if self.optics not in LIQUID_OPTICS:
@@ -122,10 +125,26 @@ class Hydrometeor(eqx.Module):
         Mass in the layer per horizontal area. [kg m-2]
     number_path
         Number of particles in the layer per horizontal area. [m-2]
+    optics
+        Whose asymmetry factor crystals have: ``"fu"``, smooth hexagonal columns (Fu 1996), or
+        ``"rough"``, severely roughened crystals of many habits (Baum et al. 2014); see
+        `optics.ice`. Of no effect on drops, graupel and hail.
+
+    Raises
+    ------
+    ValueError
+        Where `optics` is neither.
     """
 
     mass_path: Float[Array, "*batch layer"]
     number_path: Float[Array, "*batch layer"]
+    optics: str = eqx.field(default=ICE_OPTICS[0], static=True)
+
+    def __check_init__(self) -> None:
+        if self.optics not in ICE_OPTICS:
+            raise ValueError(
+                f"optics of Hydrometeor must be one of {ICE_OPTICS}; got {self.optics!r}."
+            )
 
 
 class Gases(eqx.Module):

@@ -15,6 +15,9 @@ _SOURCES = {
     "surface_temperature_source": "temperature of the ground",
 }
 
+# By the attribute of that name.
+_CLOUD_OPTICS = {"mie": "Mie theory", "mitchell": "modified anomalous diffraction"}
+
 # The same for how many columns something covers.
 _COVERS = {
     "last_resort_albedo_count": "land with the albedo of last resort",
@@ -56,6 +59,7 @@ def account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
     if "standard_atmosphere" in account:
         yield f"ozone, and vapour and temperature above: {account['standard_atmosphere']}"
     yield f"gases that absorb: {account['gases']}"
+    yield f"optics of cloud droplets: {_CLOUD_OPTICS[str(account['cloud_optics'])]}"
     for name in CLASSES:
         if f"assumed_{name}_number_count" in account:
             yield f"number of {name}, assumed: as the microphysics {account['microphysics']} does"

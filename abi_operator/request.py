@@ -5,6 +5,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
+from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import GRASSO2013
 from .files.stored import ALL
 from .optics import ALL_GASES
@@ -39,7 +40,7 @@ class Request(NamedTuple):
         Of the ground in C07, as `scene.scenario` takes it.
     land_albedo, sea_ice_albedo, snow_albedo
         As `scene.scenario` takes them. [-]
-    gases, hydrometeors, microphysics, droplet_number
+    gases, hydrometeors, microphysics, droplet_number, cloud_optics, ice_optics
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
     satellite, satellite_longitude
         Name; degrees, east positive, where it does not stand at its usual place.
@@ -68,6 +69,8 @@ class Request(NamedTuple):
     hydrometeors: tuple[str, ...] | None = None
     microphysics: str | None = None
     droplet_number: DropletNumber | None = None
+    cloud_optics: str = LIQUID_OPTICS[0]
+    ice_optics: str = ICE_OPTICS[0]
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
     time: int | str | None = None

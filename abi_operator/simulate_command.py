@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence, typed, user_warnings
 from .files import output_folder
@@ -137,6 +138,22 @@ def simulate(
             "its microphysics assumes, or else 100,300.",
         ),
     ] = None,
+    cloud_optics: Annotated[
+        str,
+        typer.Option(
+            metavar=" | ".join(LIQUID_OPTICS),
+            help="How cloud droplets scatter: by Mie theory, or as in Grasso et al. (2013), by "
+            "modified anomalous diffraction, without a rainbow.",
+        ),
+    ] = LIQUID_OPTICS[0],
+    ice_optics: Annotated[
+        str,
+        typer.Option(
+            metavar=" | ".join(ICE_OPTICS),
+            help="How strongly crystals of ice scatter forwards: as Fu's smooth columns, or as "
+            "severely roughened crystals of many habits.",
+        ),
+    ] = ICE_OPTICS[0],
     satellite: Annotated[
         str, typer.Option(help=f"Whose imager looks: {', '.join(SATELLITES)}.")
     ] = "GOES-16",
@@ -221,6 +238,8 @@ def simulate(
         hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
         microphysics=microphysics,
         droplet_number=droplets,
+        cloud_optics=cloud_optics,
+        ice_optics=ice_optics,
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=num_streams,

@@ -36,10 +36,12 @@ from .scene import (
     PlumeSpecification,
     check_absorption,
     check_classes,
+    check_cloud_optics,
     check_emissivity,
     check_gases,
     check_ground,
     check_ice_albedo,
+    check_ice_optics,
     check_land_albedo,
     check_microphysics,
     check_sight,
@@ -107,6 +109,8 @@ def open_scene(request: Request) -> Scene:
     check_absorption(request.satellite, request.bands, check_gases(request.gases))
     check_classes(request.hydrometeors or ())
     check_microphysics(request.microphysics)
+    check_cloud_optics(request.cloud_optics)
+    check_ice_optics(request.ice_optics)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
     check_variables(request.variables)
@@ -188,6 +192,8 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         hydrometeors=scene.hydrometeors,
         microphysics=request.microphysics,
         droplet_number=request.droplet_number,
+        cloud_optics=request.cloud_optics,
+        ice_optics=request.ice_optics,
         standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )

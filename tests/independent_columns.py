@@ -98,7 +98,7 @@ def specified_columns(each, seed):
     return [column(kind, rng) for kind in KINDS for _ in range(each)]
 
 
-def states(columns, liquid_optics="mitchell"):
+def states(columns, liquid_optics="mie"):
     """Columns as the package takes them, one batch; `liquid_optics` is that of `LiquidCloud`."""
 
     def stacked(read):

@@ -50,7 +50,7 @@ def plume_layers(made, depth, brightness, base, top):
     return depth * brightness * plumes.share_of_layers(made["height"], base, top)
 
 
-def parts(made, band, *, mie_phase=mie_tables.phase, liquid_optics="mitchell"):
+def parts(made, band, *, mie_phase=mie_tables.phase, liquid_optics="mie"):
     """What scatters in a column in a band.
 
     `mie_phase` gives moments and phase function of a plume of spheres, from species, number of

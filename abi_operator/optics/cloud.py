@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from ..atmosphere import Atmosphere
+from ..atmosphere import Atmosphere, LiquidCloud
 from ..bands import AnyBand, OneOf, constants, first_missing, one_of
 from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
@@ -11,10 +11,10 @@ from .anomalous_diffraction import Matter, matter, mean_efficiencies
 from .droplets import NU, effective_radius
 from .mie_aerosol import mie_optics
 from .mie_phase import MiePhase
-from .mie_table import DROPLETS
+from .mie_table import DROPLETS, mie_table
 from .phase import HenyeyGreenstein
 from .pointwise import pointwise
-from .water import REFRACTIVE_INDEX, droplet_asymmetry
+from .water import EFFECTIVE_RADIUS_UM, REFRACTIVE_INDEX, droplet_asymmetry
 
 # Radius at which the formulas are evaluated, to no effect, where there is no cloud. [m]
 _IDLE_RADIUS = 1e-5
@@ -25,11 +25,16 @@ def liquid_cloud(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
 
     .. math:: \tau = \frac{3\, m\, \bar Q_\mathrm{ext}}{4\, \rho_w\, r_\mathrm{eff}}
 
-    By ``optics="mitchell"`` of the cloud, efficiencies are by modified anomalous diffraction
+    By default, ``optics="mie"`` of the cloud, efficiencies and phase function are Mie theory by
+    table (`MiePhase`). By ``"mitchell"`` efficiencies are by modified anomalous diffraction
     (`mean_efficiencies`), and the phase function is that of Henyey and Greenstein with the
-    asymmetry factor of Mie theory (`droplet_asymmetry`); by ``"mie"`` all are Mie theory by table
-    for effective radii of 1.74-59 um (`MiePhase`). A layer without mass or without number is
-    empty, with derivative 0.
+    asymmetry factor of Mie theory (`droplet_asymmetry`), which has no rainbow and no glory.
+
+    The table is for effective radii of 1.74-59 um (`fitted_radii_um`). Beyond, efficiencies and
+    phase function stay what they are at its ends, where their slopes have faded to 0: the optical
+    depth goes on as mass over radius does, all of it continuous with its derivative, and
+    `outside_fitted_range` tells how much of the optical depth is there. A layer without mass or
+    without number is empty, with derivative 0.
 
     Parameters
     ----------
@@ -59,6 +64,18 @@ def liquid_cloud(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     extinction = cross_section * q_ext
     scatterer = Scatterer(extinction - cross_section * q_abs, phase)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
+
+
+def fitted_radii_um(liquid: LiquidCloud) -> tuple[float, float]:
+    """Smallest and largest effective radius that the optics of a liquid cloud are for. [um]
+
+    Of Mie tables, whose first and last interval are there for the slopes to fade, what lies
+    between; of ``"mitchell"`` the range of the asymmetry factor.
+    """
+    if liquid.optics == "mie":
+        radii = mie_table(DROPLETS).effective_radius_um
+        return float(radii[1]), float(radii[-2])
+    return float(EFFECTIVE_RADIUS_UM[0]), float(EFFECTIVE_RADIUS_UM[-1])
 
 
 @pointwise

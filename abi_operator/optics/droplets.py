@@ -20,19 +20,26 @@ from .pointwise import choose, pointwise
 # doi:10.1175/1520-0469(1971)028<1400:MSOPLI>2.0.CO;2)
 NU = 7.0
 # Effective radii between which mass and number are believed. [m] Smaller droplets are haze, larger
-# ones drizzle; in both a model's number is unreliable and a derivative with respect to it useless.
+# ones drizzle; in both a model's number is unreliable.
 SMALLEST_RADIUS, LARGEST_RADIUS = 1e-6, 1e-4
 
 # Mass of the mean droplet where the effective radius is 1 m. [kg]
 _UNIT_MASS = math.pi / 6 * WATER_DENSITY * (NU + 1) * (NU + 2) * (NU + 3) * (2 / (NU + 3)) ** 3
+# Effective radius where the mass of the mean droplet is 1 kg. [m]
+_UNIT_RADIUS = _UNIT_MASS ** (-1 / 3)
 
 
 def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
-    """Effective radius of the droplets; 0, with derivative 0, in a layer without cloud. [m]
+    r"""Effective radius of the droplets; 0, with derivative 0, in a layer without cloud. [m]
 
-    It is held between 1 and 100 um, so that a trace of mass spread over many droplets has a finite
-    derivative. A layer has no cloud unless both mass and number are positive; that mass comes with
-    number is checked where data enter a scene, not here.
+    It is what mass and number say, r, from 1 to 100 um. Beyond, mass is kept and r bends towards
+    0.61 and 165 um, so that a trace of mass spread over many droplets has a finite optical depth
+    and derivative: with :math:`r_s` of 1 um and :math:`r_l` of 100 um
+
+    .. math:: r_s \exp\frac{(r / r_s)^2 - 1}{2}, \qquad r_l \exp\frac{1 - (r_l / r)^2}{2},
+
+    whose slopes are continuous with that of r. A layer has no cloud unless both mass and number are
+    positive; that mass comes with number is checked where data enter a scene, not here.
 
     Parameters
     ----------
@@ -45,11 +52,18 @@ def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
 @pointwise
 def _radius(mass: Float[Array, "*n"], number: Float[Array, "*n"]) -> Float[Array, "*n"]:
     cloudy = (mass > 0) & (number > 0)
-    small = mass <= number * (_UNIT_MASS * SMALLEST_RADIUS**3)
-    large = mass >= number * (_UNIT_MASS * LARGEST_RADIUS**3)
-    usual = cloudy & ~small & ~large
-    # Roots are divided, and not masses, as the derivative of a quotient squares its denominator.
-    radius = jnp.cbrt(choose(usual, mass, 1.0)) / jnp.cbrt(choose(usual, number, 1.0))
-    radius = radius * _UNIT_MASS ** (-1 / 3)
-    limited = choose(small, SMALLEST_RADIUS, choose(large, LARGEST_RADIUS, radius))
-    return choose(cloudy, limited, 0.0)
+    small = cloudy & (mass <= number * (_UNIT_MASS * SMALLEST_RADIUS**3))
+    large = cloudy & (mass >= number * (_UNIT_MASS * LARGEST_RADIUS**3))
+    # Roots are divided, and not masses, as the derivative of a quotient squares its denominator; of
+    # large droplets upside down, for the same reason.
+    mass_root, number_root = (jnp.cbrt(choose(cloudy, x, 1.0)) for x in (mass, number))
+    quotient = choose(large, number_root, mass_root) / choose(large, mass_root, number_root)
+    beyond = choose(
+        small,
+        quotient * (_UNIT_RADIUS / SMALLEST_RADIUS),
+        choose(large, quotient * (LARGEST_RADIUS / _UNIT_RADIUS), 1.0),
+    )
+    excess = (beyond * beyond - 1) / 2  # 0 between the limits
+    bend = jnp.exp(choose(large, -excess, excess))
+    limit = choose(small, SMALLEST_RADIUS, choose(large, LARGEST_RADIUS, quotient * _UNIT_RADIUS))
+    return choose(cloudy, limit * bend, 0.0)

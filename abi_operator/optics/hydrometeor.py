@@ -13,9 +13,9 @@ from ..atmosphere import Atmosphere, Hydrometeor
 from ..bands import AnyBand, Band, OneOf, constants, first_missing, one_of
 from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
-from . import rain, water
+from . import rain, rough_ice, water
 from .anomalous_diffraction import Matter, matter, mean_efficiencies
-from .cloud import liquid_cloud
+from .cloud import fitted_radii_um, liquid_cloud
 from .droplets import LARGEST_RADIUS, NU, SMALLEST_RADIUS, effective_radius
 from .gamma import Habit, equivalent_shape, mean_mass_of_path, photon_path, sphere_habit
 from .ice import (
@@ -46,7 +46,7 @@ RIMED_ASYMMETRY = 0.8
 # 2948-2962, 2006, doi:10.1175/JAS3775.1; it moves extinction by 1 % or less from 20 um on)
 CRYSTAL_TUNNELLING = 0.7
 
-ASYMMETRIES = ("droplets", "rain", "fu1996", "roughened")
+ASYMMETRIES = ("droplets", "rain", "fu1996", "baum2014", "roughened")
 EFFICIENCIES = ("mitchell", "fu1996")
 # Beyond a limit of size the logarithm of size goes on by this much at most. [-]
 _BEND = 0.5
@@ -68,7 +68,8 @@ class ClassOptics(NamedTuple):
         towards 1.65 times the limit, or its inverse, while mass stays what it is.
     asymmetry
         Asymmetry factor: a number, or one of ``"droplets"``, ``"rain"`` (Mie theory), ``"fu1996"``
-        (smooth hexagonal columns), ``"roughened"`` (0.75). [-]
+        (smooth hexagonal columns), ``"baum2014"`` (rough crystals of many habits),
+        ``"roughened"`` (0.75). [-]
     efficiencies
         Extinction and absorption by ``"mitchell"`` (modified anomalous diffraction) or, for ice,
         ``"fu1996"`` (geometric optics of hexagonal columns of the same effective size).
@@ -144,8 +145,8 @@ def hydrometeor(
         raise ValueError(f"no hydrometeor {name!r}; the atmosphere has {have}.")
     if missing := first_missing(band.name, ICE_INDEX):
         raise ValueError(f"no index of ice and water for {missing!r}; have {list(ICE_INDEX)}.")
-    optics, habit = _class_optics(name, classes)
     particles = atmosphere.hydrometeors[name]
+    optics, habit = _class_optics(name, classes, particles)
     present, radius = _radius(particles, optics, habit)
     mass = jnp.where(present, particles.mass_path, 0)
     cross_section, absorbed, asymmetry = _seen(radius, optics, habit, band)
@@ -200,9 +201,10 @@ def outside_fitted_range(
 ) -> Float[Array, ""]:
     """Fraction of the optical depth of hydrometeors whose size is beyond what was fitted. [-]
 
-    Fitted are effective radii of 2-50 um for droplets, 20-2000 um for rain, and generalized
-    effective sizes of 20-130 um for ice by Fu (1996). Where the asymmetry factor is a given number
-    just the limits of the class count.
+    Fitted are effective radii of 1.74-59 um for the liquid cloud by Mie theory and 2-50 um for one
+    by ``"mitchell"`` and the class of that kind, 20-2000 um for rain, and generalized effective
+    sizes of 20-130 um for ice by Fu (1996), effective radii of 5-60 um for rough ice. Where the
+    asymmetry factor is a given number just the limits of the class count.
 
     Parameters
     ----------
@@ -211,24 +213,29 @@ def outside_fitted_range(
     """
     cloud = liquid_cloud(atmosphere, band).tau[0]
     radius_um = 1e6 * effective_radius(atmosphere.liquid)
-    smallest, largest = water.EFFECTIVE_RADIUS_UM[0], water.EFFECTIVE_RADIUS_UM[-1]
+    smallest, largest = fitted_radii_um(atmosphere.liquid)
     total = jnp.sum(cloud)
     outside = jnp.sum(jnp.where((radius_um < smallest) | (radius_um > largest), cloud, 0))
     for name in sorted(atmosphere.hydrometeors):
         tau = hydrometeor(atmosphere, name, band, classes).tau[0]
-        optics, habit = _class_optics(name, classes)
-        _, radius = _radius(atmosphere.hydrometeors[name], optics, habit)
+        particles = atmosphere.hydrometeors[name]
+        optics, habit = _class_optics(name, classes, particles)
+        _, radius = _radius(particles, optics, habit)
         smallest, largest = _fitted_radii(optics)
         total = total + jnp.sum(tau)
         outside = outside + jnp.sum(jnp.where((radius < smallest) | (radius > largest), tau, 0))
     return safe_divide(outside, total)
 
 
-def _class_optics(name: str, classes: Mapping[str, ClassOptics]) -> tuple[ClassOptics, Habit]:
-    """Assumptions of a class and its habit, checked."""
+def _class_optics(
+    name: str, classes: Mapping[str, ClassOptics], particles: Hydrometeor | None = None
+) -> tuple[ClassOptics, Habit]:
+    """Assumptions of a class, as its particles ask for them, and its habit, checked."""
     if name not in classes:
         raise ValueError(f"nothing is assumed of hydrometeor {name!r}; have {sorted(classes)}.")
     optics = classes[name]
+    if particles is not None and (particles.optics, optics.asymmetry) == ("rough", "fu1996"):
+        optics = optics._replace(asymmetry="baum2014")
     if isinstance(optics.habit, str) and optics.habit not in HABITS:
         raise ValueError(f"no habit {optics.habit!r} (of {name!r}); have {list(HABITS)}.")
     if isinstance(optics.asymmetry, str) and optics.asymmetry not in ASYMMETRIES:
@@ -327,6 +334,8 @@ def _of_radius(
         asymmetry = rain.rain_asymmetry(radius_um, band)
     elif optics.asymmetry == "fu1996":
         asymmetry = ice_asymmetry(size_um, fits)
+    elif optics.asymmetry == "baum2014":
+        asymmetry = rough_ice.rough_ice_asymmetry(radius_um, band)
     else:
         asymmetry = jnp.full_like(radius, ROUGHENED_ASYMMETRY)
     return extinction, absorption, asymmetry
@@ -339,6 +348,9 @@ def _fitted_radii(optics: ClassOptics) -> tuple[float, float]:
         return 1e-6 * water.EFFECTIVE_RADIUS_UM[0], 1e-6 * water.EFFECTIVE_RADIUS_UM[-1]
     if kind == "rain":
         return 1e-6 * rain.EFFECTIVE_RADIUS_UM[1], 1e-6 * rain.EFFECTIVE_RADIUS_UM[-1]
+    if kind == "baum2014":
+        radii_um = rough_ice.EFFECTIVE_RADIUS_UM
+        return 1e-6 * radii_um[0], 1e-6 * radii_um[-1]
     if "fu1996" in (kind, optics.efficiencies):
         lower, upper = (1e-6 * size * 3 / (4 * SIZE_PER_PATH) for size in FU_RANGE_UM)
         return lower, upper

@@ -8,7 +8,8 @@ coordinate of the scattering angle
 (b, f of 1e-6), then in the logarithm of effective radius (`radius_cubics`). The coordinate is
 smooth in the cosine, with a finite derivative at exact forward and backward scattering too, and
 spends as many nodes on a degree about the glory as on a quadrant elsewhere. Moments are
-interpolated in radius alone.
+interpolated in radius alone; beyond those that the table has, which are enough for 64 streams, they
+are integrals of its P (`mie_moments`).
 
 Between its nodes P is within 1e-3 of Mie theory for aerosols and within 4e-3 for droplets (both the
 worst of all bands, at 180 degrees; 2e-4 in C04-C07). Narrow resonances, of which sums over spheres
@@ -26,6 +27,7 @@ from jaxtyping import Array, Float
 
 from ..bands import OneOf, constants, one_of
 from ..optical_properties import PhaseFunction
+from .mie_moments import moments_of
 from .mie_table import band_table, mie_table, stacked
 from .pointwise import pointwise
 from .radius_cubics import locate, read
@@ -50,19 +52,7 @@ class MiePhase(PhaseFunction):
     band: OneOf = eqx.field(converter=one_of)
 
     def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
-        """Legendre moments.
-
-        Raises
-        ------
-        ValueError
-            Where more are asked for than the table holds.
-        """
-        held = band_table(self.material, self.band.names[0]).moments.shape[1]
-        if num_moments > held:
-            raise ValueError(
-                f"the Mie table of {self.material!r} holds {held} moments, enough for {held - 1} "
-                f"streams; got {num_moments=}."
-            )
+        """Legendre moments: those of the table, and beyond the 65 it has those of its P."""
         radius_um = jnp.atleast_1d(self.effective_radius_um)
         return _moments(radius_um[:, None], self.material, self.band, num_moments)
 
@@ -81,7 +71,7 @@ def _moments(
     radius_um: Float[Array, "layer 1"], material: str, band: OneOf, num_moments: int
 ) -> Float[Array, "layer moment"]:
     row, weights = locate(radius_um[:, 0], mie_table(material).effective_radius_um)
-    table, first = stacked(material, band, lambda x: x.moments[:, :num_moments])
+    table, first = stacked(material, band, lambda x: moments_of(x, num_moments))
     return read(jnp.asarray(table, weights.dtype), row + first, weights)
 
 

@@ -10,6 +10,10 @@ from .account import add_accounts as add_accounts
 from .account import negative_lines as negative_lines
 from .albedo import check_ground as check_ground
 from .angles import SATELLITE_LONGITUDE as SATELLITE_LONGITUDE
+from .cloud_optics import check_cloud_optics as check_cloud_optics
+from .cloud_optics import check_ice_optics as check_ice_optics
+from .cloud_optics import cloud_optics_of as cloud_optics_of
+from .cloud_optics import ice_optics_of as ice_optics_of
 from .column_air import completion_heights as completion_heights
 from .column_air import highest_top as highest_top
 from .columns import column_states as column_states

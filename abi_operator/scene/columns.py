@@ -10,6 +10,7 @@ from ..atmosphere import Atmosphere, Gases, Hydrometeor, LiquidCloud, MiePlume, 
 from ..bands import GRASSO2013, check_bands
 from ..geometry import Geometry
 from ..nomenclature import PLUME
+from .cloud_optics import cloud_optics_of, ice_optics_of
 from .species import classes_of, species_of
 
 _GASES = ("vapour", "ozone")
@@ -31,7 +32,8 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     -------
     State
         NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
-        faster. Gases, temperatures and hydrometeors are those that the scenario has.
+        faster. Gases, temperatures and hydrometeors are those that the scenario has, and clouds
+        scatter as its attributes say (`cloud_optics_of`, `ice_optics_of`).
     """
     bands = check_bands(bands, [str(band) for band in scenario["band"].values])
     reader = _Reader(scenario)
@@ -41,15 +43,19 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
         for name in ("solar_zenith", "view_zenith", "relative_azimuth")
     }
     liquid = LiquidCloud(
-        reader.values("liquid_mass_path", "layer"), reader.values("liquid_number_path", "layer")
+        reader.values("liquid_mass_path", "layer"),
+        reader.values("liquid_number_path", "layer"),
+        cloud_optics_of(scenario),
     )
     plumes: dict[str, Plume | MiePlume] = {
         species: _plume(reader, species, bands) for species in species_of(scenario)
     }
+    ice_optics = ice_optics_of(scenario)
     hydrometeors = {
         name: Hydrometeor(
             reader.values(f"{name}_mass_path", "layer"),
             reader.values(f"{name}_number_path", "layer"),
+            ice_optics,
         )
         for name in classes_of(scenario)
     }

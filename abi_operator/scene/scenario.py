@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
+from ..atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from ..bands import BANDS, GRASSO2013, check_bands
 from ..files import InputError
 from ..files.netcdf import cf_attributes
@@ -23,6 +24,7 @@ from .account import (
 from .albedo import surface_albedo
 from .angles import SATELLITE_LONGITUDE, angle_flags, find_angles
 from .checks import check_scenario
+from .cloud_optics import check_cloud_optics, check_ice_optics, optics_attributes
 from .column_air import complete_air, completion_heights, highest_top
 from .droplet_number import DropletNumber
 from .emissivity import Emissivity
@@ -51,6 +53,8 @@ def scenario(
     hydrometeors: Sequence[str] | None = None,
     microphysics: str | None = None,
     droplet_number: DropletNumber | None = None,
+    cloud_optics: str = LIQUID_OPTICS[0],
+    ice_optics: str = ICE_OPTICS[0],
     standard_atmosphere: str | None = None,
     added_heights: Sequence[float] | None = None,
     rows: slice = slice(None),
@@ -98,6 +102,12 @@ def scenario(
     droplet_number
         Number of droplets where the model has none; None for that of the microphysics
         scheme, or general ones where it has none (`DropletNumber`). [m-3]
+    cloud_optics
+        By which theory liquid cloud scatters: ``"mie"``, or ``"mitchell"`` for that of Grasso et
+        al. (2013); see `LiquidCloud`.
+    ice_optics
+        Whose asymmetry factor crystals have: ``"fu"``, smooth columns, or ``"rough"``; see
+        `Hydrometeor`.
     standard_atmosphere
         Name of the one that gives ozone, and what is above the model; None for the nearest
         (`nearest_standard_atmosphere`). The blocks of a scene need the same.
@@ -119,10 +129,12 @@ def scenario(
     ------
     InputError
         Where albedo or emissivity is missing or does not cover the scene, a number of particles
-        cannot be assumed, the gases of a band are not known of the satellite, or a value is out of
-        its range.
+        cannot be assumed, the gases of a band are not known of the satellite, optics of
+        clouds have no such name, or a value is out of its range.
     """
     bands, gases = check_bands(bands), check_gases(tuple(gases))
+    check_cloud_optics(cloud_optics)
+    check_ice_optics(ice_optics)
     check_absorption(satellite, bands, gases)
     if added_heights is None:
         added_heights = completion_heights(highest_top(model))
@@ -182,6 +194,7 @@ def scenario(
         "satellite": satellite,
         "satellite_longitude": satellite_longitude,
         "gases": gases_attribute(gases),
+        **optics_attributes(cloud_optics, ice_optics),
         "air_above_model": "US Standard Atmosphere 1976, scaled to the pressure at the model's top",
         "num_levels_above_model": len(added_heights),
         "assumed_droplet_number": condensate.droplets.number.describe(model),

@@ -24,6 +24,7 @@ from ..radiance import THERMAL, radiance
 from ..reflectance import brf
 from ..satellites import solar_irradiance
 from .angles import sun_distance
+from .cloud_optics import cloud_optics_of, ice_optics_of, optics_attributes
 from .columns import column_states, horizontal
 from .gases import check_gases, gases_attribute, gases_of
 
@@ -45,7 +46,8 @@ def simulate(
 
     In C07 sunlight and emission are one radiance. In the other bands radiance follows from the
     reflectance factor, :math:`L = \rho E_0 / (\pi d^2)`, with the solar irradiance of the
-    scenario's satellite and the distance of the sun at its time (1 AU where it has none).
+    scenario's satellite and the distance of the sun at its time (1 AU where it has none). Clouds
+    scatter as the scenario says (`cloud_optics_of`, `ice_optics_of`).
 
     Parameters
     ----------
@@ -114,7 +116,8 @@ def simulate(
     # Of NetCDF's attributes none is no number: nothing is left out.
     left_out = {} if error_budget is None else {"error_budget": error_budget}
     how = {"num_streams": num_streams, "gases": gases_attribute(gases)}
-    return result.assign_attrs(how | left_out)
+    clouds = optics_attributes(cloud_optics_of(scenario), ice_optics_of(scenario))
+    return result.assign_attrs(how | clouds | left_out)
 
 
 def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:

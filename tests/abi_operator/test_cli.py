@@ -59,7 +59,7 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
     picture = "natural_color_2007-10-23T180000.png"
     assert sorted(path.name for path in out.iterdir()) == ["inputs", picture, "result.nc"]
     assert f"wrote {out / 'result.nc'}" in outcome.output
-    assert "64 pixels; flagged: outside_fit 1" in outcome.output
+    assert "64 pixels; flagged: none" in outcome.output
     assert f"computed on {usable_cores()} core" in outcome.output
     with read_result(out / "result.nc") as result:
         assert result.sizes["time"] == 1 and result.sizes["band"] == 4
@@ -77,21 +77,28 @@ def test_demo_writes_inputs_result_and_picture(invoke, tmp_path):
         assert image.size == (512, 512)
 
 
-def test_droplet_numbers_can_be_chosen(invoke, tmp_path, inputs):
+def test_droplet_numbers_and_optics_can_be_chosen(invoke, tmp_path, inputs):
     options = ["--ocean-albedo", 0.03, "--bands", "C01", "--num-streams", 2]
     options += ["--albedo", inputs.albedo, "--droplet-number"]
     depths = []
-    for number in ("250", "250,500"):
+    for number, kind in (("250", ()), ("250,500", ("--cloud-optics", "mitchell"))):
         out = tmp_path / number
-        outcome = invoke("simulate", inputs.wrf, *options, number, "--out", out)
+        outcome = invoke("simulate", inputs.wrf, *options, number, *kind, "--out", out)
         assert outcome.exit_code == 0, outcome.output
         with read_result(out / "result.nc") as result:
             depths.append(result["liquid_optical_depth"].values)
+            assert result.attrs["cloud_optics"] == (kind or ("", "mie"))[1]
+            assert (
+                scene.column_states(result.isel(time=0), ("C01",)).atmosphere.liquid.optics
+                == (result.attrs["cloud_optics"])
+            )
+    assert "optics of cloud droplets: modified anomalous diffraction" in outcome.output
     said = "250 cm-3 over water, 500 cm-3 over land (as asked for)"
     assert f"droplet number, assumed: {said}" in outcome.output
     thick = depths[0] > 1
     ratio = depths[1][thick] / depths[0][thick]
-    assert np.all((abs(ratio - 1) < 0.01) | (abs(ratio - 2 ** (1 / 3)) < 0.03))
+    # Efficiencies of the two optics differ by up to 3 %.
+    assert np.all((abs(ratio - 1) < 0.03) | (abs(ratio - 2 ** (1 / 3)) < 0.06))
     outcome = invoke("simulate", inputs.wrf, *options, "1e8", "--out", tmp_path / "no")
     assert outcome.exit_code == 2 and "at most 10000 cm-3" in outcome.stderr
 
@@ -393,6 +400,8 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--satellite", "GOES-13"], "'GOES-13'"),
         (["--gases", "SO2"], "['SO2'] are not known"),
         (["--hydrometeors", "sleet"], "['sleet'] are not known"),
+        (["--cloud-optics", "fu"], "cloud optics 'fu' are not known; choose from mie, mitchell"),
+        (["--ice-optics", "mie"], "ice optics 'mie' are not known; choose from fu, rough"),
         (["--microphysics", "p3"], "nothing is known of microphysics 'p3'"),
         (["--bands", "all"], "C07 needs the emissivity of the ground"),
         (["--bands", "C04", "--satellite", "GOES-19"], "is not known of GOES-19"),

@@ -100,7 +100,7 @@ def test_radiances_with_emission_and_fires(columns):
     """Sunlight and emission in one solve, in the bands in which fires shine.
 
     CDISORT is given the temperatures at which its Planck function is the in-band one. Every tenth
-    column lies in the dark, the sun's distance differs, and droplets are those of Mie theory.
+    column lies in the dark, the sun's distance differs, and droplets are those of Mitchell.
     """
     rng = np.random.default_rng(SEED)
     distance = rng.uniform(0.983, 1.017, len(columns))
@@ -108,7 +108,7 @@ def test_radiances_with_emission_and_fires(columns):
         c | {"solar_zenith": rng.uniform(1.6, 3.0)} if i % 10 == 0 else c
         for i, c in enumerate(columns)
     ]
-    state = independent_columns.states(seen, "mie")
+    state = independent_columns.states(seen, "mitchell")
     ours = radiance(
         state, EMITTING, sun_distance=distance, num_streams=STREAMS, num_doublings=DOUBLINGS
     )
@@ -117,7 +117,7 @@ def test_radiances_with_emission_and_fires(columns):
             independent.cdisort_sum(
                 c,
                 band,
-                independent.layers(c, band, liquid_optics="mie"),
+                independent.layers(c, band, liquid_optics="mitchell"),
                 STREAMS,
                 sources(c, band, distance[i]),
             )
@@ -164,15 +164,9 @@ def test_plumes_of_spheres_straight_from_mie_theory(columns, reflected):
 def test_sixteen_streams(columns):
     """Two columns of each kind, in a band of air and plumes and one of vapour and ice."""
     few, bands = columns[:: FEW // 2], ("C01", "C05")
-    ours = brf(
-        independent_columns.states(few, "mie"), bands, num_streams=16, num_doublings=DOUBLINGS
-    )
+    ours = brf(independent_columns.states(few), bands, num_streams=16, num_doublings=DOUBLINGS)
     reference = [
-        [
-            independent.cdisort_sum(c, b, independent.layers(c, b, liquid_optics="mie"), 16)
-            for b in bands
-        ]
-        for c in few
+        [independent.cdisort_sum(c, b, independent.layers(c, b), 16) for b in bands] for c in few
     ]
     assert_equal(np.asarray(ours), np.array(reference), few, bands)
 

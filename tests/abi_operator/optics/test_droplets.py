@@ -38,8 +38,30 @@ def test_effective_radius_of_the_gamma_distribution():
 def test_clear_and_doubtful_layers():
     mass = [0.0, 0.0, 1e-3, -1e-9, 1e-12, 1.0]
     number = [0.0, 1e9, 0.0, 1e9, 1e10, 1.0]
-    expected = [0, 0, 0, 0, SMALLEST_RADIUS, LARGEST_RADIUS]
-    np.testing.assert_array_equal(effective_radius(cloud(mass, number)), expected)
+    # Far beyond the limits half of the logarithm of size is left, from each.
+    ends = SMALLEST_RADIUS * math.exp(-0.5), LARGEST_RADIUS * math.exp(0.5)
+    found = effective_radius(cloud(mass, number))
+    np.testing.assert_array_equal(found[:4], 0)
+    np.testing.assert_allclose(found[4:], ends, rtol=1e-3)
+
+
+@pytest.mark.parametrize("limit", [SMALLEST_RADIUS, LARGEST_RADIUS])
+def test_size_goes_beyond_its_limits_without_a_kink(limit):
+    """Value and slope against the logarithm of mass are continuous; size still rises beyond."""
+    number = 1e9
+    mass = 4 / 3 * math.pi * WATER_DENSITY * limit**3 * number * 0.72  # 0.72 for the variance 0.1
+    step = np.concatenate([[-1.0, -1e-6], [1e-6, 1.0]])  # of the logarithm of radius
+
+    def radius(log_step):
+        return effective_radius(cloud(mass * jnp.exp(3 * log_step)[None], [number]))[0]
+
+    found = np.array([radius(x) for x in step])
+    slope = np.array([jax.grad(radius)(x) for x in step])
+    np.testing.assert_allclose(found[1:3], limit, rtol=2e-6)
+    np.testing.assert_allclose(slope[1:3], limit, rtol=2e-5)
+    outer, inner = (0, 3) if limit == SMALLEST_RADIUS else (3, 0)
+    assert found[inner] == pytest.approx(limit * math.exp(step[inner]), rel=1e-12)
+    assert np.all(np.diff(found) > 0) and 0 < slope[outer] < slope[inner] * math.exp(-step[inner])
 
 
 @pytest.mark.float32

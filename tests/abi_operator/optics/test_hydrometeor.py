@@ -52,7 +52,7 @@ def test_every_class_of_every_scheme_has_optics():
 def test_cloud_among_hydrometeors_is_the_liquid_cloud(make_atmosphere, band):
     mass, number = [0.02, 0.05, 0.01, 0.1], [1.5e10, 2e10, 3e10, 1e10]
     atmosphere = column(make_atmosphere, "cloud", mass, number)
-    liquid = LiquidCloud(jnp.asarray(mass), jnp.asarray(number))
+    liquid = LiquidCloud(jnp.asarray(mass), jnp.asarray(number), "mitchell")
 
     @jax.jit
     def both():

@@ -9,7 +9,8 @@ import pytest
 from abi_operator.bands import BANDS, several_bands
 from abi_operator.optics import MiePhase, mie_species
 from abi_operator.optics.mie_aerosol import mie_optics
-from abi_operator.optics.mie_table import DROPLETS, mie_table
+from abi_operator.optics.mie_moments import moments_of
+from abi_operator.optics.mie_table import DROPLETS, band_table, mie_table
 
 REFERENCES, GEOMETRIES = mie_reference.read()
 MATERIALS = [*mie_species(), DROPLETS]
@@ -168,6 +169,15 @@ def test_layers_are_independent():
     )
 
 
-def test_too_many_moments_are_named():
-    with pytest.raises(ValueError, match=r"'ash' holds 65 moments, enough for 64 streams; got"):
-        MiePhase(jnp.asarray(3.0), "ash", "C01").moments(66)
+@pytest.mark.parametrize("material", MATERIALS)
+def test_moments_go_on_where_the_table_ends(material):
+    """Those that the table has are those of its P to 1e-5; what follows is of the same series."""
+    for band in ("C01", "C07"):
+        table = band_table(material, band)
+        found = moments_of(table._replace(moments=table.moments[:, :1]), 65)[2:-2]
+        np.testing.assert_allclose(found, table.moments[2:-2], rtol=0, atol=2e-5)
+        radius = jnp.asarray(mie_table(material).effective_radius_um[5])
+        many = np.asarray(MiePhase(radius, material, band).moments(200))[0]
+        np.testing.assert_array_equal(many[:65], MiePhase(radius, material, band).moments(65)[0])
+        step = np.abs(np.diff(many))
+        assert step[60:70].max() < 1.2 * step[50:64].max() + 2e-5

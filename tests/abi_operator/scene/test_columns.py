@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 
 from abi_operator import smoke
+from abi_operator.files import InputError
 from abi_operator.scene import PlumeSpecification, column_states, scenario
 
 BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
@@ -37,6 +38,17 @@ def test_a_state_holds_what_the_scenario_says_of_its_column(made):
     assert plume.ssa["C06"] == made["smoke_ssa"].sel(band="C06")
 
 
+def test_a_cloud_scatters_as_the_scenario_or_its_result_says(made):
+    def optics(dataset):
+        return column_states(dataset, ("C01",)).atmosphere.liquid.optics
+
+    assert optics(made) == "mie"
+    assert optics(made.assign_attrs(cloud_optics="mitchell")) == "mitchell"
+    assert optics(made.drop_attrs(deep=False)) == "mie"
+    with pytest.raises(InputError, match="cloud optics 'fu' are not known"):
+        optics(made.assign_attrs(cloud_optics="fu"))
+
+
 def test_a_state_has_the_gases_temperatures_and_particles_of_the_scenario(make_model):
     ice = {"ice_mixing_ratio": 1e-5, "ice_number_mixing_ratio": 1e5, "surface_temperature": 300.0}
     options = {"ocean_albedo": 0.06, "emissivity": 0.9, "bands": ("C01", "C07")}
@@ -49,7 +61,10 @@ def test_a_state_has_the_gases_temperatures_and_particles_of_the_scenario(make_m
     np.testing.assert_array_equal(state.atmosphere.temperature, column["temperature"])
     np.testing.assert_array_equal(state.surface_temperature, 300.0)
     np.testing.assert_allclose(state.albedo["C07"], 0.1)
+    rough = column_states(made.assign_attrs(ice_optics="rough"), ("C07",))
+    assert rough.atmosphere.hydrometeors["ice"].optics == "rough"
     particles = state.atmosphere.hydrometeors
+    assert particles["ice"].optics == "fu"
     assert list(particles) == ["ice"]
     np.testing.assert_array_equal(particles["ice"].mass_path, column["ice_mass_path"])
     np.testing.assert_array_equal(particles["ice"].number_path, column["ice_number_path"])

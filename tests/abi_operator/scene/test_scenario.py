@@ -44,6 +44,16 @@ def test_a_scenario_has_the_variables_of_the_nomenclature(make_scenario):
     assert made.attrs["model_title"] == "test"
 
 
+def test_optics_of_the_cloud_are_chosen_by_name(make_scenario):
+    assert make_scenario().attrs["cloud_optics"] == "mie"
+    assert make_scenario(cloud_optics="mitchell").attrs["cloud_optics"] == "mitchell"
+    with pytest.raises(InputError, match="cloud optics 'fu' are not known; choose from mie, mit"):
+        make_scenario(cloud_optics="fu")
+    assert make_scenario().attrs["ice_optics"] == "fu"
+    with pytest.raises(InputError, match="ice optics 'mie' are not known; choose from fu, rough"):
+        make_scenario(ice_optics="mie")
+
+
 def test_cloud_stays_below_the_completed_levels(make_scenario, make_model):
     made, model = make_scenario(), make_model()
     assert (made["liquid_mass_path"][:8] == 0).all()

@@ -74,6 +74,26 @@ def test_an_error_budget_is_kept_and_told(made):
     assert 0 < wrong.max() < 1e-3
 
 
+def test_a_cloud_scatters_as_asked_and_the_result_says_how(made):
+    mie = simulate(made, **OPTIONS)
+    mitchell = simulate(made.assign_attrs(cloud_optics="mitchell"), **OPTIONS)
+    for result, name in ((mie, "mie"), (mitchell, "mitchell")):
+        assert result.attrs["cloud_optics"] == name
+        again = simulate(result, **OPTIONS)
+        np.testing.assert_array_equal(again["brf"], result["brf"])
+    cloudy, clear = (abs(mie["brf"] / mitchell["brf"] - 1).isel(x=x) for x in (0, 1))
+    assert (cloudy > 1e-3).all() and (clear < ROUNDING).all()
+
+
+def test_ice_is_smooth_or_rough(warm):
+    """Asymmetry factors of 0.90 and 0.92 in C07, for these of 30 um."""
+    rough = simulate(warm.assign_attrs(ice_optics="rough"), bands=("C07",), **OPTIONS)
+    smooth = simulate(warm, bands=("C07",), **OPTIONS)
+    assert (rough.attrs["ice_optics"], smooth.attrs["ice_optics"]) == ("rough", "fu")
+    ratio = rough["radiance"] / smooth["radiance"]
+    assert (abs(ratio - 1) > 1e-5).isel(y=1).all() and (abs(ratio - 1) < 0.1).isel(y=1).all()
+
+
 def test_bands_can_be_chosen(made):
     one = simulate(made, bands=("C03",), **OPTIONS)
     assert one["band"].values.tolist() == ["C03"]
