@@ -24,12 +24,12 @@ C07    4      0.0035, 0.033   lines, MT_CKD 4.3 (vapour, N2O), LOWTRAN7 (CO2, CH
 Errors in C02 and C03 are those of vapour, whose lines saturate where m times the precipitable
 water is 20 cm and more: one grey depth is right to 0.004 below. In C04 the responses of GOES-16 to
 -18 are meant; that of GOES-19 lies 6 nm higher. The closed forms of 6SV differ from their model by
-up to 0.001 (C02, C03, C05) and 0.003 (C06) besides. The lines of N2O in C06 transmit up to 0.0015
-less than its closed form.
+up to 0.001 (C02, C03, C05) and 0.003 (C06) besides. The lines of N2O in C06 transmit up to 0.0010
+less than the sum.
 
 In C07 vapour alone has an error of 0.0031 and any other gas alone of 0.0064, from 0 to 18 km to
 space. What a source of 250, 1000 or 5778 K emits in place of 300 K is transmitted by up to 0.005,
-0.016 and 0.020 differently; clear brightness temperatures are nevertheless within 0.06 K of line by
+0.016 and 0.020 differently; clear brightness temperatures are nevertheless within 0.05 K of line by
 line, by day and by night (`benchmarks/lines_temperature.py`, with vapour and N2O). Most of what
 vapour absorbs there are lines of HDO, and the rest is nearly all its self continuum: there and back
 at m = 2 vapour lets pass 0.950 of the light of the US standard atmosphere and 0.865 of the tropical
