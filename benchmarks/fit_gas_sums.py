@@ -1,4 +1,4 @@
-"""Fit the joint exponential sums of gases in C02, C03, C05 and C06.
+"""Fit the joint exponential sums of gases in C02, C03 and C05.
 
 The transmittance of each gas alone is that of the 6SV2.1 band model over the response of GOES-16,
 by closed forms in air mass, amount and pressure; gases together are their product. One sum is
@@ -105,12 +105,17 @@ def rounded(fitted: Sum) -> Sum:
     return Sum(np.round(weight, 6), four(fitted.coefficients[:, order]))
 
 
-def report(title: str, names: list[str], fitted: Sum, samples: Samples) -> None:
-    """Print one band: its sum, and its largest errors by gases and by air mass."""
+def report(
+    title: str, names: list[str], fitted: Sum, samples: Samples, grey: np.ndarray | float = 1.0
+) -> None:
+    """Print one band: its sum, and its largest errors by gases and by air mass.
+
+    `grey` is the transmittance by which that of the samples is to be multiplied.
+    """
     print(f"{title}: weight {tuple(fitted.weight.tolist())}")
     for name, row in zip(names, fitted.coefficients, strict=True):
         print(f"  {name}: {tuple(float(k) for k in row)}")
-    error = np.abs(fitted(samples.amounts) - samples.transmittance)
+    error = grey * np.abs(fitted(samples.amounts) - samples.transmittance)
     gases = [name.split()[0] for name in names]
     present = {
         g: np.any([c > 0 for n, c in zip(gases, samples.amounts.T, strict=True) if n == g], axis=0)
@@ -132,7 +137,6 @@ VAPOUR = {
     "C02": (-6.046273, 0.994595, -0.0474989),
     "C03": (-6.685169, 1.001040, -0.0347434),
     "C05": (-7.688753, 1.045866, -0.0194371),
-    "C06": (-5.964783, 0.983784, -0.0472000),
 }
 MIXED = {
     ("C02", "O2"): (0.00101579, 0.604425, 1.001446, 0.0),
@@ -149,12 +153,12 @@ EXPONENTS = {
     ("C06", "CH4"): 0.2708,
     ("C06", "N2O"): 0.0660,
 }
-# Gases, terms, and the largest air mass that is fitted. Ozone is grey by itself.
+# Gases, terms, and the largest air mass that is fitted. Ozone is grey by itself, and vapour in C06
+# is fitted to its lines, by `fit_gas_c06.py` with the closed forms above.
 BANDS = {
     "C02": (("H2O", "O2"), 1, 6.0),
     "C03": (("H2O",), 1, 6.0),
     "C05": (("CO2", "CH4", "H2O"), 3, 12.0),
-    "C06": (("CH4", "N2O", "H2O"), 3, 12.0),
 }
 
 

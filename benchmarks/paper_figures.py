@@ -160,6 +160,12 @@ def gases():
     print(f"Transmittance of the gases, down and up, in case 1 from 75 W (air mass {air_mass:.2f},")
     print("1 cm of precipitable water, 280 DU of ozone), which the paper takes to be 1:\n")
     table(bands, [[f"{x:.3f}" for x in found]])
+    up, air = 1 / view.mu, standard_atmosphere("midlatitude_summer")
+    taking = ("H2O", "CO2", "CH4", "N2O", "N2")
+    groups = (*((gas,) for gas in taking), taking)
+    found = [transmittance(gas_absorption(air, BANDS["C07"], x), up) for x in groups]
+    print(f"Transmittance of C07, up alone (air mass {up:.2f}), by gas of midlatitude summer:\n")
+    table([*taking, "all"], [[f"{x:.3f}" for x in found]])
 
 
 def near_infrared():

@@ -11,7 +11,8 @@ from abi_operator.optics.gas.tables import TABLES
 
 STANDARD_PRESSURE = 101325.0
 # Exponent of pressure and reference mole fraction of each mixed gas and band, in the order of the
-# tables: HITRAN-like scaling of a fit to 6SV2.1 in C05 and C06, of LOWTRAN's amounts in C07.
+# tables: HITRAN-like scaling of a fit to 6SV2.1 in C05 and C06, of LOWTRAN's amounts in C07, but of
+# N2O there of a fit to its lines.
 MIXED = {
     "C02": {"O2": (0.0, None)},
     "C05": {"CO2": (0.4341, 400e-6), "CH4": (0.2195, 1.85e-6)},
@@ -19,7 +20,7 @@ MIXED = {
     "C07": {
         "CO2": (1.0, 330e-6),
         "CH4": (0.81, 1.7e-6),
-        "N2O": (0.79, 0.32e-6),
+        "N2O": (0.4, 0.33e-6),
         "N2": (0.92, None),
     },
 }
@@ -40,7 +41,12 @@ def amounts(air, band):
     ozone = air["ozone"] / 1000.0
     pressure = 0.5 * (air["pressure"][:-1] + air["pressure"][1:])
     temperature = 0.5 * (air["temperature"][:-1] + air["temperature"][1:])
-    above = np.concatenate([[0.0], np.cumsum(centimetres)])
+    # Pressure of the vapour itself, of the mass that it has in the layer's air.
+    humidity = 9.80665 * air["vapour"] / np.diff(air["pressure"])
+    own = pressure * humidity / (0.622 + 0.378 * humidity)
+    density = pressure / STANDARD_PRESSURE * 296.0 / temperature
+    own_continuum = air["vapour"] * own / STANDARD_PRESSURE * (296.0 / temperature) ** 7
+    foreign_continuum = air["vapour"] * density
 
     def mixed(gas):
         exponent, reference = MIXED[band][gas]
@@ -58,20 +64,21 @@ def amounts(air, band):
         warmth = (temperature - 250.0) / 250.0
         lines = air["vapour"] * (pressure / 5e4) ** 0.8823
         lines = lines * (1.0 - 0.8018 * warmth - 0.5533 * warmth**2)
-        density = pressure / STANDARD_PRESSURE * 296.0 / temperature
-        return [lines, air["vapour"] * density]
+        return [lines, foreign_continuum]
     if band == "C05":
         return [mixed("CO2"), mixed("CH4"), centimetres]
     if band == "C06":
         return [
             mixed("CH4"),
             mixed("N2O"),
-            centimetres,
-            centimetres,
-            np.diff(above**2),
+            air["vapour"] * (pressure / STANDARD_PRESSURE) ** 0.7,
+            own_continuum,
+            foreign_continuum,
         ]
-    lines = air["vapour"] * (pressure / STANDARD_PRESSURE) ** 1.36
-    return [mixed("CO2"), mixed("CH4"), mixed("N2O"), mixed("N2"), lines]
+    lines = air["vapour"] * (pressure / STANDARD_PRESSURE) ** 0.3
+    lines = lines * (1.0 + 1.5 * (temperature - 250.0) / 250.0)
+    dry = [mixed(gas) for gas in MIXED[band]]
+    return [*dry, lines, own_continuum, foreign_continuum]
 
 
 def terms(air, band):

@@ -31,6 +31,17 @@ _ALBEDO = {
 # cosine would be infinite.
 _OBLIQUE, _GLINT, _NADIR = (0.6, 0.8, 1.2), (0.5, 0.7, 2.9), (0.9, 0.0, 0.4)
 _LOW_SUN, _NIGHT = (1.3, 0.6, 0.5), (2.2, 0.5, 1.0)
+# Bands over the sea and over grass where the ground is not Lambertian: none that emits.
+_SEA, _LAND = ("C01", "C02", "C04", "C06"), ("green", "C03", "C05")
+# Layer, and particles in a kilogram, of the classes beside ice, snow and rain.
+_OTHER_CLASSES = {
+    "drizzle": (_STRATUS_LAYER, 2e9),
+    "pristine": (_ICE_LAYER, 2e10),
+    "aggregates": (_SNOW_LAYER, 1e7),
+    "graupel": (_SNOW_LAYER, 1e6),
+    "hail": (_SNOW_LAYER, 1e4),
+}
+_MIE_RADII = {"smoke": 0.2, "ash": 2.0}  # [um]
 
 
 def standard_columns() -> dict[str, State]:
@@ -39,8 +50,8 @@ def standard_columns() -> dict[str, State]:
     Most columns are of one structure: smoke, ash, one plume of every species that has a table of
     Mie theory but no published optics, droplets, ice, snow, rain, gases and a fire, with nothing
     of what is not in the column. So a derivative by what is absent is guarded as well, and they
-    are one batch. Grounds that are not Lambertian and Mie theory of droplets have columns of
-    another. Leaves are float64 whatever JAX is set to.
+    are one batch. Grounds that are not Lambertian, Mie theory of droplets, smoke and ash, and other
+    classes of hydrometeors have columns of another. Leaves are float64 whatever JAX is set to.
     """
     with jax.enable_x64(True):
         return _columns()
@@ -62,6 +73,8 @@ def _columns() -> dict[str, State]:
         columns[species] = _column(_GLINT, table=species, table_aod=0.5)
     columns["sea and land"] = _on_rough_ground(_GLINT)
     columns["Mie droplets over sea and land"] = _on_rough_ground(_OBLIQUE, liquid=0.02)
+    columns["Mie smoke and ash over sea and land"] = _on_rough_ground(_OBLIQUE, aod=0.4)
+    columns["other hydrometeors over sea and land"] = _on_rough_ground(_GLINT, condensate=0.02)
     return columns
 
 
@@ -108,13 +121,36 @@ def _column(
     )
 
 
-def _on_rough_ground(angles: tuple[float, float, float], liquid: float = 0.0) -> State:
-    """The sea in C02 and grass in C03, in air without plumes, frozen water and fires."""
-    mass, number = _in_layer(_STRATUS_LAYER, liquid, 7e11)
+def _on_rough_ground(
+    angles: tuple[float, float, float],
+    *,
+    liquid: float = 0.0,
+    aod: float = 0.0,
+    condensate: float = 0.0,
+) -> State:
+    """The sea in some bands and grass in the others, in air without fires.
+
+    With droplets by Mie theory, smoke and ash by Mie theory in one layer, and of each of the other
+    classes of hydrometeors a mass in kg m-2.
+    """
     grass = RossLi(f_iso=jnp.asarray(0.3), f_vol=jnp.asarray(0.15), f_geo=jnp.asarray(0.03))
+    wind = jnp.asarray(6.0)
+    air = standard_atmosphere(
+        "us_standard",
+        _HEIGHT,
+        liquid=LiquidCloud(*_in_layer(_STRATUS_LAYER, liquid, 7e11), "mie"),
+        plumes={
+            name: mie_plume(name, aod, radius, base=1000.0, top=3000.0)
+            for name, radius in _MIE_RADII.items()
+        },
+        hydrometeors={
+            name: Hydrometeor(*_in_layer(layer, condensate, number_per_mass))
+            for name, (layer, number_per_mass) in _OTHER_CLASSES.items()
+        },
+    )
     return State(
-        standard_atmosphere("us_standard", _HEIGHT, liquid=LiquidCloud(mass, number, "mie")),
-        {"C02": ocean(jnp.asarray(6.0), "C02"), "C03": grass},
+        air,
+        {band: ocean(wind, band) for band in _SEA} | dict.fromkeys(_LAND, grass),
         Geometry(*(jnp.asarray(angle) for angle in angles)),
     )
 

@@ -8,13 +8,14 @@ layer stands for the layer). `amounts_of` gives one number a layer for each.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...atmosphere import Atmosphere, Gases
 from ...constants import STANDARD_PRESSURE
 from ..pointwise import choose, pointwise
+
+_GRAVITY = 9.80665  # standard [m s-2]
 
 
 def ozone_column(atmosphere: Atmosphere) -> Float[Array, " layer"]:
@@ -27,18 +28,22 @@ def vapour_column(atmosphere: Atmosphere) -> Float[Array, " layer"]:
     return 0.1 * gases_of(atmosphere).vapour
 
 
-def self_broadened_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
-    r"""Vapour of each layer times that above it, :math:`U_{k+1}^2 - U_k^2`. [cm2]
+def self_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
+    r"""Vapour times its own pressure, as its self continuum has it. [kg m-2]
 
-    U is the precipitable water above a level. The self continuum is in proportion to the partial
-    pressure of the vapour, which is in proportion to U where vapour falls exponentially with
-    height; the whole column then has the square of its precipitable water.
+    .. math:: u_k\, \frac{e}{p_0} \Bigl(\frac{296\ \mathrm{K}}{T}\Bigr)^7, \qquad
+       e = \frac{q\, p}{0.622 + 0.378\, q}, \quad q = \frac{g\, u_k}{\Delta p}, \quad
+       p_0 = 1013.25\ \mathrm{hPa}
+
+    at the middle of the layer, with its vapour u and the difference of pressure between its levels.
+    The power of temperature is that of MT_CKD 4.3 in C06 and C07 (density has one of the seven). A
+    layer of no air has none.
     """
-    layer = vapour_column(atmosphere)
-    # A product: `jnp.cumsum` is a chain of kernels.
-    above = jnp.tri(layer.size, dtype=layer.dtype)
-    below = jnp.matmul(above, layer, precision=jax.lax.Precision.HIGHEST)
-    return layer * (2 * below - layer)
+    air, vapour = jnp.diff(atmosphere.pressure), gases_of(atmosphere).vapour
+    filled = air > 0
+    humidity = jnp.where(filled, _GRAVITY * vapour / jnp.where(filled, air, 1.0), 0.0)
+    own = humidity * _middle(atmosphere.pressure) / (0.622 + 0.378 * humidity)
+    return vapour * (own / STANDARD_PRESSURE) * (296 / _middle(temperature_of(atmosphere))) ** 7
 
 
 class MixedGas(NamedTuple):

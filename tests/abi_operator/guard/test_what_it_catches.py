@@ -21,6 +21,7 @@ from abi_operator.optics import CLASSES, mie_species
 COLUMN = importlib.import_module("abi_operator.optics.column")
 BAND_COLUMNS = importlib.import_module("abi_operator.band_columns")
 PROGRAM = importlib.import_module("abi_operator.solver.program")
+OCEAN = importlib.import_module("abi_operator.surface.ocean")
 
 SEEN = ("C02",)
 FACTORS = "factors of faults"
@@ -33,6 +34,8 @@ SIZES |= {"sign of a derivative": 2.0, "float32": 1.0}
 
 # Those of one structure, with all the producers in it.
 EVERY = {name for name, state in guard.standard_columns().items() if state.fire is not None}
+ROUGH = set(guard.standard_columns()) - EVERY
+FROZEN = "other hydrometeors over sea and land"
 # By day: in C02 there is nothing to see of the sun's light by night.
 DAY = EVERY - {"fire by night"}
 SMOKY = {"smoke", "smoke over stratus", "fire by day"}
@@ -205,3 +208,35 @@ def test_a_changed_default_of_a_builder(monkeypatch):
     for name in EVERY:
         old, new = before[name].atmosphere.gases, after[name].atmosphere.gases
         assert abs(new.carbon_dioxide / old.carbon_dioxide - 1) > guard.INPUT_TOLERANCE
+
+
+def test_a_changed_foam(monkeypatch):
+    """Of a band of the sea: its columns have another state, which needs no solving."""
+    before = guard.standard_columns()
+    monkeypatch.setitem(OCEAN.FOAM_REFLECTANCE, "C01", 0.221)
+    after = guard.standard_columns()
+    for name in ROUGH:
+        old, new = (x[name].albedo["C01"].foam_reflectance for x in (before, after))
+        assert abs(new / old - 1) > guard.INPUT_TOLERANCE
+
+
+def test_other_classes_and_mie_plumes_are_seen():
+    """The columns on rough ground have every class and plume that the others have not."""
+    columns = guard.standard_columns()
+    classes = {name for x in columns.values() for name in x.atmosphere.hydrometeors}
+    assert classes == set(CLASSES) - {"cloud"}
+    plumes = columns["Mie smoke and ash over sea and land"].atmosphere.plumes
+    assert {plume.species for plume in plumes.values()} == {"smoke", "ash"}
+    for name, hydrometeor in columns[FROZEN].atmosphere.hydrometeors.items():
+        assert np.sum(hydrometeor.mass_path) > 0, name
+
+
+def test_graupel_of_another_asymmetry(monkeypatch):
+    """By 0.001, in the column that has graupel."""
+    column = {FROZEN: guard.standard_columns()[FROZEN]}
+    stored = guard.evaluate(column, ("C01",))
+    monkeypatch.setitem(CLASSES, "graupel", CLASSES["graupel"]._replace(asymmetry=0.801))
+    # As above: doublings of its own, so that the program is another.
+    now = guard.evaluate(column, ("C01",), num_doublings=11)
+    caught = guard.compare(stored, now).moved
+    assert "" in {entry.entry for entry in caught}

