@@ -59,8 +59,16 @@ def demo(
         before = pictures_of_before(out)
         with output_folder(out, outdated=before) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
-            # As in the paper, which neglects absorption by gases.
-            request = Request(inputs.wrf, inputs.albedo, _DEMO_OCEAN_ALBEDO, inputs.plume, gases=())
+            # As in the paper, which neglects absorption by gases. Nothing is left out, since the
+            # retrieval is to find the very optical depths that made the image.
+            request = Request(
+                inputs.wrf,
+                inputs.albedo,
+                _DEMO_OCEAN_ALBEDO,
+                inputs.plume,
+                gases=(),
+                error_budget=None,
+            )
             request = request._replace(command=typed(context))
             report = simulate_scene(open_scene(request), folder)
         print_report(report, out, before)

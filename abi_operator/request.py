@@ -9,7 +9,7 @@ from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import GRASSO2013
 from .files.stored import ALL
 from .optics import ALL_GASES
-from .scene import DropletNumber, Emissivity, IceAlbedo, LandAlbedo
+from .scene import ERROR_BUDGET, DropletNumber, Emissivity, IceAlbedo, LandAlbedo
 
 
 class Species(StrEnum):
@@ -47,7 +47,8 @@ class Request(NamedTuple):
     time
         Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
     num_streams, error_budget
-        Streams of the solver, and the relative error that it may make for speed (None: none).
+        Streams of the solver, and the relative error that it may make for speed, as
+        `scene.simulate` takes them.
     variables
         What the result keeps, as `files.stored` takes it.
     rayleigh_correction
@@ -75,7 +76,7 @@ class Request(NamedTuple):
     satellite_longitude: float | None = None
     time: int | str | None = None
     num_streams: int = 8
-    error_budget: float | None = None
+    error_budget: float | None = ERROR_BUDGET
     land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None
     snow_albedo: IceAlbedo | None = None

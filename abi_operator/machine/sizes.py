@@ -21,6 +21,8 @@ leave it idle."""
 
 # What another device than a CPU takes, of whatever is taken together.
 _ELSEWHERE = 4096
+# Tiles of a chunk of columns that are sorted.
+_SORTED_TILES = 32
 # Columns of the solver in a tile of states, in tiles of the solver: its own loop is inside.
 _SOLVER_TILES = 8
 
@@ -51,9 +53,15 @@ def tile_of_grounds() -> int:
     return 64 if _on_cpu() else _ELSEWHERE
 
 
-def chunks_of_columns(num_streams: int, dtype: Any) -> tuple[int, ...]:
-    """Numbers of the solver's columns that are worth a program, rising."""
+def chunks_of_columns(num_streams: int, dtype: Any, in_order: bool = False) -> tuple[int, ...]:
+    """Numbers of the solver's columns that are worth a program, rising.
+
+    Those that are put `in_order` before they are cut into tiles are the more alike in a tile the more
+    there are of them.
+    """
     tile = tile_size(num_streams, dtype)
+    if in_order:
+        return 8, tile, 8 * tile, _SORTED_TILES * tile
     # At few streams a chunk is solved in few times what it needs to begin and to end.
     return (8, tile, 8 * tile, 16 * tile) if num_streams <= 8 else (8, tile, 8 * tile)
 

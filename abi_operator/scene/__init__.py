@@ -34,6 +34,7 @@ from .run import run as run
 from .scenario import check_absorption as check_absorption
 from .scenario import scenario as scenario
 from .sight import check_sight as check_sight
+from .simulate import ERROR_BUDGET as ERROR_BUDGET
 from .simulate import simulate as simulate
 from .snow_and_ice import IceAlbedo as IceAlbedo
 from .snow_and_ice import check_ice_albedo as check_ice_albedo

@@ -8,7 +8,7 @@ import xarray as xr
 from ..radiance import THERMAL
 from .account import Attribute, add_accounts
 from .progress import Progress
-from .simulate import simulate
+from .simulate import ERROR_BUDGET, simulate
 
 ReadBlock = Callable[[int, slice], xr.Dataset]
 WriteBlock = Callable[[int, slice, xr.Dataset], None]
@@ -35,7 +35,7 @@ def run(
     write_block: WriteBlock,
     *,
     num_streams: int = 8,
-    error_budget: float | None = None,
+    error_budget: float | None = ERROR_BUDGET,
     block_columns: int = 16384,
     progress: bool = True,
 ) -> dict[str, Attribute]:

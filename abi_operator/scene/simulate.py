@@ -28,6 +28,10 @@ from .cloud_optics import cloud_optics_of, ice_optics_of, optics_attributes
 from .columns import column_states, horizontal
 from .gases import check_gases, gases_attribute, gases_of
 
+ERROR_BUDGET = 1e-3
+"""Relative error of the reflectance of scenes that is spent on speed, unless another is asked for:
+far below the noise of the instrument. [-]"""
+
 # Pixels with one of these flags are not solved; those of a night shine in C07.
 _UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 _UNSOLVED = _UNSEEN | QUALITY_FLAGS["night"]
@@ -39,7 +43,7 @@ def simulate(
     bands: Sequence[str] | None = None,
     gases: Sequence[str] | None = None,
     num_streams: int = 8,
-    error_budget: float | None = None,
+    error_budget: float | None = ERROR_BUDGET,
     listener: Listener | None = None,
 ) -> xr.Dataset:
     r"""Simulate the radiances and reflectances of a scenario.
@@ -58,7 +62,8 @@ def simulate(
     gases
         Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams, error_budget
-        Streams of the solver, and what it may leave out; see `solver.Settings`.
+        Streams of the solver, and the relative error that it may make for speed on top of what they
+        leave; None solves everything. See `solver.Settings`.
     listener
         Is told of columns as they are solved: all that can be in the bands without emission, then
         all that can be in each of the others.

@@ -123,7 +123,8 @@ class _Program(NamedTuple):
         )
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        return chunks_of_columns(self.options.num_streams, leaves[0].dtype)
+        skips = self.options.error_budget is not None
+        return chunks_of_columns(self.options.num_streams, leaves[0].dtype, in_order=skips)
 
     def tile(self, leaves: Leaves) -> int:
         return tile_size(self.options.num_streams, jnp.result_type(*leaves))

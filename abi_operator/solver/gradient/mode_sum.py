@@ -154,9 +154,9 @@ def _reflectance(
         stack = over_layers(add, modes.ground(mode, mean), plan, upwards=True)
         return top(stack).reflection()
 
-    def another(total, mode):
+    def another(total, mode, counts):
         found = reflection(False, mode)
-        total = total + mode.weight * found
+        total = total + counts * mode.weight * found
         return total, None, total, jnp.max(jnp.abs(found), axis=0)
 
     # Without slopes a kernel for the mean alone is soon compiled, and a tenth faster than to ask in
@@ -218,10 +218,10 @@ def _reflectance_and_gradient(inputs, plan, how):
         )
     shared = Shared(modes.layers, inputs.view_secants[0], faces)
 
-    def one(carry, mode):
+    def one(carry, mode, counts):
         value, slopes, of_mean, room = carry
         kernels, ground = _kernels(mode.nodes, mode.beams), modes.ground(mode)
-        weight = mode.weight[0]
+        weight = counts * mode.weight[0]
         reflection, room, found = mode_slopes(
             shared, plan, how.single_scattering, mode.order, kernels, ground, weight, slopes, room
         )
@@ -232,7 +232,7 @@ def _reflectance_and_gradient(inputs, plan, how):
         value = value + weight * reflection
         # The mean is never the last by chance.
         size = jnp.where(mode.order.mean > 0, jnp.full_like(value, jnp.inf), jnp.abs(reflection))
-        row = reflection[None], (found.even_beams, found.odd_beams), own
+        row = counts * reflection[None], (found.even_beams, found.odd_beams), own
         return (value, found.shared, of_mean, room), row, value, size
 
     nothing = jax.tree.map(jnp.zeros_like, (shared.view_secant, shared, inputs.ground))

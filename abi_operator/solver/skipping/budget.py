@@ -2,10 +2,14 @@ r"""The error budget: what of it each way of skipping may spend.
 
 A budget b is a relative error of the reflectance that may be made on top of what the streams leave:
 of max(brf, `LEAST_BRF`), in 99 of 100 columns. Layers are merged until b times `OF_MERGING` is
-estimated to be lost at a group of them (`grouping`), azimuth modes are dropped from where they
-count less than b times `OF_MODES` (`mode_sum`), and a layer's doublings leave b times
-`OF_DOUBLINGS` of its own response (`doublings`). These shares were fitted on columns of other seeds
-than those that `benchmarks/skipping.py` judges them by.
+estimated to be lost at a group of them (`grouping`), a column's azimuth modes end where they count
+less than b times `OF_MODES` (`mode_sum`), and a layer's doublings leave b times `OF_DOUBLINGS` of
+its own response (`doublings`). These shares were fitted on columns of other seeds than those that
+`benchmarks/skipping.py` judges them by.
+
+Groups and modes are each column's own. Of doublings a layer has as many as that column of its tile
+asks for that needs most: what a column gets depends on those that it is solved with by about a
+thousandth of the budget.
 """
 
 from typing import NamedTuple

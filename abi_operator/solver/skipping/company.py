@@ -1,10 +1,17 @@
 r"""Which columns are solved side by side: those that need as much.
 
 A tile solves as many groups of layers and as many modes as that of its columns that needs most.
-Columns are therefore put in an order in which neighbours need alike before they are cut into tiles.
-The order only costs time where it is wrong: it follows from a rough count of a column's groups, and
-among equals from how fast its azimuth modes will decay, which they do the slower the more obliquely
-sun and satellite look at the more scattering.
+Columns are therefore put in an order in which neighbours need alike before they are cut into tiles:
+by the number of their groups and, among equals, by that of their modes,
+
+.. math::
+   m = \frac{\ln\left(S^2 s / (b R)\right)}{-\ln(\tan\frac\theta2 \tan\frac{\theta_0}2)},
+   \qquad S = \frac{\sum\omega\tau}{1 + \sum\omega\tau},
+
+as if light scattered twice, of which there is S^2 s, lost the same share of itself from mode to
+mode until it counts less than the budget b times the reflectance R; s is the sum of the secants.
+Every other number of groups begins with the columns of most modes, so that a tile of two numbers
+has columns that are alike in their modes. The order only costs time where it is wrong.
 """
 
 import jax
@@ -13,6 +20,8 @@ from jaxtyping import Array, Float
 
 from . import budget
 from .grouping import group_labels
+
+_STRAIGHT = 1e-6  # product of the tangents of half the zenith angles, which is 0 for either at 0
 
 
 def need(
@@ -46,6 +55,10 @@ def need(
     known = budget.expected(nothing, ground[None], tau, 1 - scattered, scattered - forward)
     allowed = budget.OF_MERGING * error_budget * known.least
     labels = group_labels(tau, scattered, forward, 0.5 * secants, allowed, float("inf"))
-    sines = jnp.sqrt(jnp.maximum(0, (1 - mu0 * mu0) * (1 - mu * mu)))
-    oblique = sines * secants * jnp.sum(forward * tau / (1 + tau), axis=0) / known.least
-    return labels[-1] + oblique / (1 + oblique)
+    depth = jnp.sum(scattered * tau, axis=0)
+    twice = (depth / (1 + depth)) ** 2 * secants / (error_budget * known.least)
+    tangents = jnp.sqrt((1 - mu0) / (1 + mu0) * (1 - mu) / (1 + mu))
+    modes = jnp.log(jnp.maximum(twice, 1)) / -jnp.log(jnp.clip(tangents, _STRAIGHT, 1 - _STRAIGHT))
+    share = modes / (1 + modes)
+    groups = labels[-1]
+    return groups + jnp.where(groups % 2 == 0, share, 1 - share)

@@ -82,13 +82,13 @@ class Plan(eqx.Module):
         tau, rows = handed_back(self.groups, self.given.tau, self.given.rows(), groups)
         return found.of_rows(tau, rows)
 
-    def settled(
+    def wanting(
         self, total: Float[Array, "*view batch"], size: Float[Array, "batch"]
-    ) -> Bool[Array, ""]:
-        """Whether modes so small, after such a sum of them, let all columns of the tile end."""
+    ) -> Bool[Array, "batch"]:
+        """Which columns need more modes after one of this size and such a sum of them."""
         assert self.known is not None and self.allowed is not None
         brf = jnp.maximum(jnp.abs(0.5 * total + self.known.added), budget.LEAST_BRF)
-        return ~jnp.any(size > self.allowed * brf)
+        return jnp.any(size > self.allowed * brf, axis=0)
 
 
 def everything(layers: LayersOfModes, doublings: Doublings) -> Plan:
@@ -161,20 +161,23 @@ def over_layers(
 
 
 def over_modes(
-    body: Callable[[Any, Any], tuple[Any, Any, Any, Any]],
+    body: Callable[[Any, Any, Any], tuple[Any, Any, Any, Any]],
     carry: Any,
     modes: Any,
     start: int,
     rows: Any,
     plan: Plan,
 ) -> tuple[Any, Any]:
-    """``carry, row, total, size = body(carry, mode)`` for the modes that count.
+    """``carry, row, total, size = body(carry, mode, counts)`` for the modes that count.
+
+    A tile ends with the last column that needs a mode. In the others it counts for nothing: what a
+    column gets does not depend on those that it is solved with.
 
     Parameters
     ----------
     body
         Of one mode; gives its row of the results, the sum of the modes so far, and how large a part
-        of it this mode may be at any azimuth.
+        of it this mode may be at any azimuth. `counts` is 1 in columns that need it, else 0.
     carry
         What goes from mode to mode.
     modes
@@ -189,25 +192,27 @@ def over_modes(
     num_modes = jax.tree.leaves(modes)[0].shape[0]
     if plan.allowed is None:
         rest = jax.tree.map(lambda x: x[start:], modes)
-        carry, found = jax.lax.scan(lambda c, mode: body(c, mode)[:2], carry, rest)
+        carry, found = jax.lax.scan(lambda c, mode: body(c, mode, 1.0)[:2], carry, rest)
         return carry, found
-    before = jnp.full_like(plan.layers.tau[0], jnp.inf)
+    tau = plan.layers.tau[0]
+    before = jnp.full_like(tau, jnp.inf)
 
     def unsettled(state):
-        m, _, _, _, settled = state
-        return (m < num_modes) & ~settled
+        m, *_, counts = state
+        return (m < num_modes) & jnp.any(counts > 0)
 
     def one(state):
-        m, carry, rows, before, _ = state
-        carry, row, total, size = body(carry, jax.tree.map(lambda x: read(x, m), modes))
+        m, carry, rows, before, counts = state
+        mode = jax.tree.map(lambda x: read(x, m), modes)
+        carry, row, total, size = body(carry, mode, counts)
         rows = jax.tree.map(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
-        either = jnp.maximum(size, budget.DECAY * before)
-        return m + 1, carry, rows, size, plan.settled(total, either)
+        wanting = plan.wanting(total, jnp.maximum(size, budget.DECAY * before))
+        return m + 1, carry, rows, size, jnp.where(wanting, counts, 0)
 
     rows = jax.tree.map(jnp.zeros_like, rows)
     _, carry, rows, _, _ = jax.lax.while_loop(
-        unsettled, one, (jnp.int32(start), carry, rows, before, jnp.asarray(False))
+        unsettled, one, (jnp.int32(start), carry, rows, before, jnp.ones_like(tau))
     )
     return carry, jax.tree.map(lambda x: x[start:], rows)

@@ -32,6 +32,7 @@ def test_chunks_are_whole_tiles_and_rise(num_streams, dtype, backend, monkeypatc
     states = sizes.tile_of_states(28, num_streams, dtype)
     for size, chunks in (
         (tile, sizes.chunks_of_columns(num_streams, dtype)),
+        (tile, sizes.chunks_of_columns(num_streams, dtype, in_order=True)),
         (states, sizes.chunks_of_states(states)),
     ):
         assert size % sizes.VECTOR == 0

@@ -14,6 +14,8 @@ from abi_operator.solver.skipping.merging import Solved, handed_back, merged
 
 # Rounding of sums in another order.
 ROUNDING = 1e-13
+# A layer has the doublings of that column of its tile that needs most (`skipping.budget`).
+ALONE = 2e-6
 LAYERS, STREAMS = 12, 4
 
 
@@ -58,6 +60,16 @@ def slopes(error_budget):
     return jax.tree.map(np.asarray, jax.grad(total)(columns()))
 
 
+@cache
+def value_beside(error_budget):
+    """Reflectances as they come with their slopes, for which more groups are made."""
+
+    def brf(arguments):
+        return toa_brf(**arguments, num_streams=STREAMS, error_budget=error_budget)
+
+    return np.asarray(jax.vjp(brf, columns())[0])
+
+
 def error(error_budget):
     exact = solved(None)
     return np.abs(solved(error_budget) - exact) / np.maximum(exact, 0.01)
@@ -71,7 +83,7 @@ def test_the_budget_is_kept(error_budget):
 
 def test_a_larger_budget_is_spent():
     """Something is left out at each of them, and more where more may be."""
-    spent = [np.median(error(x)) for x in (1e-2, 1e-3, 1e-5)]
+    spent = [np.mean(error(x)) for x in (1e-2, 1e-3, 1e-5)]
     assert spent[0] > spent[1] > spent[2] > 1e-12
 
 
@@ -89,19 +101,39 @@ def test_slopes_of_members_are_their_own(error_budget):
 
 
 def test_the_same_inside_of_everything():
-    """Under `jax.jit`, mapped one by one, in other company: a column's neighbours change nothing
-    but what is left out for it, within the budget."""
+    """Under `jax.jit`, mapped one by one and with the others in another order: what is left out for
+    a column hardly depends on any other."""
     given, error_budget = columns(), 1e-3
 
     def one(arguments):
         return toa_brf(**arguments, num_streams=STREAMS, error_budget=error_budget)
 
-    np.testing.assert_allclose(jax.jit(one)(given), solved(error_budget), rtol=2 * error_budget)
-    np.testing.assert_allclose(jax.vmap(one)(given), solved(error_budget), rtol=2 * error_budget)
-    both = jax.jit(jax.vmap(jax.value_and_grad(one)))(given)
-    np.testing.assert_allclose(both[0], solved(error_budget), rtol=2 * error_budget)
-    wanted = slopes(error_budget)["albedo"]
-    np.testing.assert_allclose(both[1]["albedo"], wanted, rtol=0.01, atol=1e-3 * wanted.max())
+    np.testing.assert_allclose(jax.jit(one)(given), solved(error_budget), rtol=ALONE)
+    np.testing.assert_allclose(jax.vmap(one)(given), solved(error_budget), rtol=ALONE)
+    order = np.random.default_rng(1).permutation(96)
+    given = {name: x[order] for name, x in given.items()}
+    _, found = jax.jit(jax.vmap(jax.value_and_grad(one)))(given)
+    for name, slope in found.items():
+        wanted = slopes(error_budget)[name]
+        np.testing.assert_allclose(slope, wanted[order], atol=ALONE * np.abs(wanted).max())
+
+
+def test_a_column_without_numbers_spoils_no_other():
+    given, error_budget = dict(columns()), 1e-3
+    given["albedo"] = np.where(np.arange(96) == 17, np.nan, given["albedo"])
+    how = {"num_streams": STREAMS, "error_budget": error_budget, "check_values": False}
+    rest = np.arange(96) != 17
+
+    def total(arguments):
+        found = toa_brf(**arguments, **how)
+        return jnp.sum(found), found
+
+    found, value = jax.grad(total, has_aux=True)(given)
+    assert np.isnan(value[17])
+    np.testing.assert_allclose(value[rest], value_beside(error_budget)[rest], rtol=ALONE)
+    for name, slope in found.items():
+        wanted = slopes(error_budget)[name]
+        np.testing.assert_allclose(slope[rest], wanted[rest], atol=ALONE * np.abs(wanted).max())
 
 
 def test_two_views_at_once():
