@@ -56,8 +56,8 @@ def tile_of_grounds() -> int:
 def chunks_of_columns(num_streams: int, dtype: Any, in_order: bool = False) -> tuple[int, ...]:
     """Numbers of the solver's columns that are worth a program, rising.
 
-    Those that are put `in_order` before they are cut into tiles are the more alike in a tile the more
-    there are of them.
+    Those that are put `in_order` before they are cut into tiles are the more alike in a tile the
+    more there are of them.
     """
     tile = tile_size(num_streams, dtype)
     if in_order:

@@ -188,8 +188,8 @@ def test_terms_are_summed_by_weight():
     groups = jax.eval_shape(lambda s: columns_of_bands(s, NAMES, ALL_GASES, 3), state)
     (group,) = groups
     counts = [num_terms(name, ALL_GASES) for name in NAMES]
-    assert [group.places.count(k) for k in range(len(NAMES))] == counts == [4, 1, 3]
-    weight = jnp.arange(1.0, 9.0)
+    assert [group.places.count(k) for k in range(len(NAMES))] == counts == [4, 1, 4]
+    weight = jnp.arange(1.0, 10.0)
     group = dataclasses.replace(group, weight=weight)
     terms = jnp.stack([weight, 2 * weight])
     found = group.summed(terms)
