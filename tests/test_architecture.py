@@ -20,6 +20,7 @@ FLOORS = [
     {"optics_and_solver", "state_checks"},
     {"bands_of_states"},
     {"band_columns", "settings"},
+    {"sun_path"},
     {"optics", "solver", "surface"},
     {"lambertian", "microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
