@@ -7,6 +7,8 @@ A radiance is one number a view: with the sun's weights c_m and reflections r_m 
 of the mean's Y and e at the top (`method.adding`), but for the Planck function B at the top, which
 is added outside. So there is one adjoint field a mode for both lights, and in the mean the source
 is that of both together (`emitting_mode`): thermal light costs the gradient a few vectors.
+
+An error budget is spent on values (`skipping`); slopes are those of every layer and every mode.
 """
 
 from functools import partial
@@ -25,7 +27,9 @@ from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
 from ..method.ground import black, isotropic
 from ..method.layer import half_layer, node_functions
-from ..method.mode_layers import Order, read
+from ..method.mode_layers import Layers, Order, read
+from ..skipping.heat import Warm, grouped_jumps, lost
+from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .emitting_mode import (
     Air,
     Heating,
@@ -34,6 +38,7 @@ from .emitting_mode import (
     slopes_of_mode,
 )
 from .mode import Kernels
+from .mode_sum import How
 from .room import Keeper
 
 _LATER = slice(1, None)  # modes but the mean
@@ -66,21 +71,71 @@ class Lit(NamedTuple):
     heating: Heating
 
 
+class Given(NamedTuple):
+    """What is known of a tile beside its inputs.
+
+    Parameters
+    ----------
+    doublings
+        Of every layer, for what solves them all.
+    warm
+        What is left out by it; None where nothing is.
+    """
+
+    doublings: Doublings
+    warm: Warm | None = None
+
+
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
-def radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[Array, "*batch"]:
+def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     """Sum over the modes of weight times reflection, and what the mean emits.
 
     Its derivatives come from its gradient. The rule is linear in the tangents, so that one gradient
     serves forward and reverse mode, and slopes that nobody asks for are not computed.
     """
-    value = partial(_radiance, single_scattering=single_scattering)
     num_nodes = _num_nodes(lit)
-    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(lit, doublings)
+    plan = _plan(lit, given, how)
+    added = jnp.zeros_like(lit.heating.above)
+    if plan.groups is not None:
+        lit, added = _in_groups(lit, given.warm, plan)
+    value = partial(_radiance, single_scattering=how.single_scattering)
+    return added + (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(lit, plan)
 
 
-def _radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[Array, "*batch"]:
-    how = doublings, single_scattering
-    first, others = (jax.tree.map(lambda x, i=i: x[i], _modes(lit)) for i in (0, _LATER))
+def _plan(lit: Lit, given: Given, how: How) -> Plan:
+    layers, warm = lit.air.layers, given.warm
+    moments = layers.moments.reshape(2, -1, *layers.moments.shape[1:])
+    of_modes = LayersOfModes(layers.tau, layers.coalbedo, layers.sun_secant, (*moments,))
+    if warm is None:
+        return everything(of_modes, given.doublings)
+    assert how.error_budget is not None
+    return planned(
+        of_modes,
+        lit.air.view_secants[:1],
+        warm.known,
+        how.error_budget,
+        how.most,
+        warm=(warm, lit.heating.jumps),
+    )
+
+
+def _in_groups(lit: Lit, warm: Warm | None, plan: Plan) -> tuple[Lit, Float[Array, "*batch"]]:
+    """The groups of layers, and unscattered thermal light that they do not have."""
+    assert warm is not None and plan.groups is not None
+    tau, coalbedo, sun_secants, moments = plan.layers
+    jumps = grouped_jumps(plan.groups, lit.heating.jumps)
+    members = lit.air.layers.tau, lit.air.layers.coalbedo, lit.heating.jumps
+    how = lit.air.view_secants[0], 2 * _num_nodes(lit)
+    added = lost(warm, plan.groups, members, (tau, coalbedo, jumps), *how)
+    layers = Layers(tau, coalbedo, sun_secants, jnp.concatenate(moments))
+    air = lit.air._replace(layers=layers)
+    return lit._replace(air=air, heating=lit.heating._replace(jumps=jumps)), added
+
+
+def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*batch"]:
+    how = plan, single_scattering
+    every = _modes(lit)
+    first = jax.tree.map(lambda x: x[0], every)
     light, one = _of_ground(lit), _one(lit)
     stack, light = _stacked(lit, first, lit.ground, light, *how)
     assert light is not None
@@ -88,12 +143,13 @@ def _radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[
     emitted = closed.emerging(light, one, 0.5 * lit.heating.above, nothing)[1]
     mean = first.weight * closed.reflection()[0] + emitted
 
-    def plus(total, mode):
+    def plus(total, mode, counts):
         ground = _nothing_below(lit) if mode.ground is None else mode.ground
         stack, _ = _stacked(lit, mode, ground, None, *how)
-        return total + mode.weight * top(stack).reflection()[0], None
+        found = counts * mode.weight * top(stack).reflection()[0]
+        return total + found, None, (total + found)[None], jnp.abs(found)
 
-    return jax.lax.scan(plus, mean, others)[0]
+    return over_modes(plus, mean, every, 1, None, plan)[0]
 
 
 def _stacked(
@@ -101,7 +157,7 @@ def _stacked(
     mode: "_Mode",
     ground: Bordered,
     light: Emission | None,
-    doublings: Doublings,
+    plan: Plan,
     single_scattering: bool,
 ) -> tuple[Bordered, Emission | None]:
     """All layers of a mode on the ground; only the mean has thermal light."""
@@ -119,16 +175,19 @@ def _stacked(
         return add_emitting_layer(stack, light, y, z, layer.tau, read(jumps, place) * (p @ one))
 
     put_on = one_kernel(put_on, _num_nodes(lit), in_parts=True)
-    shared = lit.air, lit.heating.jumps, doublings, mode.order.odd, _kernels(mode), _one(lit)
 
-    def add(below, *number):
-        return put_on(below, *shared, *number), None
+    def of_all(below, air, jumps, plan, odd, kernels, one):
+        shared = air, jumps, plan.doublings, odd, kernels, one
 
-    tau = lit.air.layers.tau
-    numbers = jnp.arange(tau.shape[0], dtype=tau.dtype)
-    if numbers.size == 1:
-        return add((ground, light))[0]
-    return jax.lax.scan(add, (ground, light), numbers, reverse=True)[0]
+        def add(below, number):
+            return put_on(below, *shared, *([] if number is None else [number]))
+
+        return over_layers(add, below, plan, upwards=True)
+
+    if plan.layers.tau.shape[0] > 1:
+        of_all = one_kernel(of_all, _num_nodes(lit), in_parts=True)
+    shared = lit.air, lit.heating.jumps, plan, mode.order.odd, _kernels(mode), _one(lit)
+    return of_all((ground, light), *shared)
 
 
 def _of_ground(lit: Lit) -> Emission:
@@ -138,9 +197,9 @@ def _of_ground(lit: Lit) -> Emission:
 
 
 @partial(radiance.defjvp, symbolic_zeros=True)
-def _radiance_jvp(single_scattering, primals, tangents):
-    lit, doublings = primals
-    value, gradient = radiance_and_gradient(lit, doublings, single_scattering)
+def _radiance_jvp(how, primals, tangents):
+    lit, given = primals
+    value, gradient = radiance_and_gradient(lit, given.doublings, how.single_scattering)
     change = jnp.zeros_like(value)
     for slope, tangent in zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents[0]), strict=True):
         if not isinstance(tangent, SymbolicZero):

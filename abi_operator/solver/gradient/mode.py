@@ -112,12 +112,16 @@ def mode_slopes(
 
     put_one = compiled(put_on_and_keep, in_parts=True)
 
-    def up(carry, number):
-        number = alone if number is None else number
-        return put_one(*carry, layers, doublings, number, order, kernels, view_secant)
+    @partial(compiled, in_parts=True)
+    def up_to_the_top(ground, room, layers, plan, order, kernels, view_secant):
+        def up(carry, number):
+            number = alone if number is None else number
+            return put_one(*carry, layers, plan.doublings, number, order, kernels, view_secant)
 
-    stack, room = over_layers(up, (ground, room), plan, upwards=True)
-    reflection, fields = _fields_at_the_top(stack, weight)
+        return over_layers(up, (ground, room), plan, upwards=True)
+
+    stack, room = up_to_the_top(ground, room, layers, plan, order, kernels, view_secant)
+    reflection, fields = compiled(_fields_at_the_top, in_parts=True)(stack, weight)
 
     @compiled
     def undo_one(carry, layers, doublings, room, number, order, kernels, view_secant):
@@ -141,12 +145,18 @@ def mode_slopes(
         totals, new = _collected(step, layer.tau, totals, a, b, coalbedo)
         return fields, totals, slopes.plus(number, order.odd, new), faces
 
-    def down(carry, number):
-        number = alone if number is None else number
-        return undo_one(carry, layers, doublings, room, number, order, kernels, view_secant)
+    @compiled
+    def down_to_the_ground(carry, layers, plan, room, order, kernels, view_secant):
+        def down(carry, number):
+            number = alone if number is None else number
+            doublings = plan.doublings
+            return undo_one(carry, layers, doublings, room, number, order, kernels, view_secant)
+
+        return over_layers(down, carry, plan)
 
     start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
-    carry = over_layers(down, (fields, start, slopes.layers, faces), plan)
+    carry = fields, start, slopes.layers, faces
+    carry = down_to_the_ground(carry, layers, plan, room, order, kernels, view_secant)
     fields, (even, odd, view), layers, faces = carry
     if faces is not None:
         below = fields._replace(other=jnp.zeros_like(fields.other))

@@ -145,19 +145,26 @@ def _reflectance(
             return add_layer(stack, *half_layer(a, p, layer.tau, own), layer.tau)
 
         put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
+
+        def of_all(ground, layers, plan, odd, kernels, view_secants):
+            shared = layers, plan.doublings, odd, kernels, view_secants
+
+            def add(stack, number):
+                return put_on(stack, *shared, *([] if number is None else [number]))
+
+            return top(over_layers(add, ground, plan, upwards=True)).reflection()
+
+        # Of one layer that is the only one XLA would find no use for what tells layers apart.
+        if plan.layers.tau.shape[0] > 1:
+            of_all = one_kernel(of_all, modes.num_nodes, in_parts=True)
         kernels, views = _kernels(mode.nodes, mode.beams), inputs.view_secants
-        shared = modes.layers, plan.doublings, mode.order.odd, kernels, views
-
-        def add(stack, number):
-            return put_on(stack, *shared, *([] if number is None else [number]))
-
-        stack = over_layers(add, modes.ground(mode, mean), plan, upwards=True)
-        return top(stack).reflection()
+        ground = modes.ground(mode, mean)
+        return of_all(ground, modes.layers, plan, mode.order.odd, kernels, views)
 
     def another(total, mode, counts):
         found = reflection(False, mode)
         total = total + counts * mode.weight * found
-        return total, None, total, jnp.max(jnp.abs(found), axis=0)
+        return total, None, 0.5 * total, jnp.max(jnp.abs(found), axis=0)
 
     # Without slopes a kernel for the mean alone is soon compiled, and a tenth faster than to ask in
     # each layer which mode it is.
@@ -233,7 +240,7 @@ def _reflectance_and_gradient(inputs, plan, how):
         # The mean is never the last by chance.
         size = jnp.where(mode.order.mean > 0, jnp.full_like(value, jnp.inf), jnp.abs(reflection))
         row = counts * reflection[None], (found.even_beams, found.odd_beams), own
-        return (value, found.shared, of_mean, room), row, value, size
+        return (value, found.shared, of_mean, room), row, 0.5 * value, size
 
     nothing = jax.tree.map(jnp.zeros_like, (shared.view_secant, shared, inputs.ground))
     keep = shared.layers.tau, modes.num_nodes, doublings.most, faces is not None

@@ -12,7 +12,8 @@ from ..method.doublings import Doublings, layer_doublings
 from ..method.mode_layers import read
 from . import budget
 from .budget import Expected
-from .grouping import Groups, grouped
+from .grouping import Alike, Groups, Limits, grouped
+from .heat import Warm
 from .merging import Solved, handed_back, merged
 
 
@@ -55,8 +56,8 @@ class Plan(eqx.Module):
     given, groups
         The layers given, and which group each belongs to; None where each is solved by itself.
     known, allowed
-        Of the reflectance beside the modes', and the share of it that a mode may count for and yet
-        be the last one; None where all modes are solved.
+        Of the light beside the modes', and the share of it that a mode may count for and yet be the
+        last one; None where all modes are solved.
     """
 
     layers: LayersOfModes
@@ -82,13 +83,19 @@ class Plan(eqx.Module):
         tau, rows = handed_back(self.groups, self.given.tau, self.given.rows(), groups)
         return found.of_rows(tau, rows)
 
+    def beyond_the_mean(self) -> Bool[Array, "batch"]:
+        """Which columns need any mode but the mean, as far as is known before."""
+        assert self.known is not None and self.allowed is not None
+        share = budget.OF_NO_MODES / budget.OF_MODES * self.allowed
+        return self.known.aside > share * self.known.least
+
     def wanting(
         self, total: Float[Array, "*view batch"], size: Float[Array, "batch"]
     ) -> Bool[Array, "batch"]:
         """Which columns need more modes after one of this size and such a sum of them."""
         assert self.known is not None and self.allowed is not None
-        brf = jnp.maximum(jnp.abs(0.5 * total + self.known.added), budget.LEAST_BRF)
-        return jnp.any(size > self.allowed * brf, axis=0)
+        light = jnp.maximum(jnp.abs(total + self.known.added), self.known.dark)
+        return jnp.any(size > self.allowed * light, axis=0)
 
 
 def everything(layers: LayersOfModes, doublings: Doublings) -> Plan:
@@ -103,6 +110,7 @@ def planned(
     error_budget: float,
     most: int | None,
     thickest: float = float("inf"),
+    warm: tuple[Warm, Float[Array, "layer *batch"]] | None = None,
 ) -> Plan:
     """What an error budget asks for.
 
@@ -111,28 +119,34 @@ def planned(
     layers, view_secants
         Of a tile.
     known
-        Of the reflectance of its columns.
+        Of the light of its columns.
     error_budget
         Relative error of the reflectance that may be made (`budget`).
     most
         Doublings of a layer, at most; None for no limit.
     thickest
         Optical depth on the way down and up that no group exceeds. [-]
+    warm
+        Of columns that emit, with the increase of the Planck function across each layer.
     """
     given, groups = layers, None
     if layers.tau.shape[0] > 1:
         secant = 0.5 * (layers.sun_secants[0] + jnp.max(view_secants, axis=0))
         allowed = budget.OF_MERGING * error_budget * known.least
         forward = layers.moments[1][:, 0] / 3
-        groups = grouped(layers.tau, 1 - layers.coalbedo, forward, secant, allowed, thickest)
+        alike = Alike(layers.tau, 1 - layers.coalbedo, forward)
+        if warm is not None:
+            heat, jumps = warm
+            levels = jnp.concatenate([heat.planck, heat.planck[-1:] + jumps[-1:]])
+            alike = alike._replace(planck=levels, sun=heat.sun)
+        groups = grouped(alike, Limits(secant, allowed, thickest))
         tau, rows = merged(groups, layers.tau, layers.rows())
         layers = layers.of_rows(tau, rows)
     views = jnp.broadcast_to(view_secants[:, None], (len(view_secants), *layers.tau.shape))
     secants = jnp.concatenate([layers.sun_secants[None], views])
     num_streams = 2 * layers.moments[0].shape[1]
-    doublings = layer_doublings(
-        layers.tau, secants, num_streams, most, budget.OF_DOUBLINGS * error_budget
-    )
+    share = budget.OF_DOUBLINGS if warm is None else budget.OF_DOUBLINGS_WARM
+    doublings = layer_doublings(layers.tau, secants, num_streams, most, share * error_budget)
     allowed_of_modes = budget.OF_MODES * error_budget
     return Plan(layers, doublings, given, groups, known, allowed_of_modes)
 
@@ -170,14 +184,15 @@ def over_modes(
 ) -> tuple[Any, Any]:
     """``carry, row, total, size = body(carry, mode, counts)`` for the modes that count.
 
-    A tile ends with the last column that needs a mode. In the others it counts for nothing: what a
-    column gets does not depend on those that it is solved with.
+    Where the mean is one of them it is the first, and counts. A tile ends with the last column that
+    needs a mode. In the others it counts for nothing: what a column gets does not depend on those
+    that it is solved with.
 
     Parameters
     ----------
     body
-        Of one mode; gives its row of the results, the sum of the modes so far, and how large a part
-        of it this mode may be at any azimuth. `counts` is 1 in columns that need it, else 0.
+        Of one mode; gives its row of the results, the light of the modes so far, and how large a
+        part of it this mode may be at any azimuth. `counts` is 1 in columns that need it, else 0.
     carry
         What goes from mode to mode.
     modes
@@ -196,6 +211,8 @@ def over_modes(
         return carry, found
     tau = plan.layers.tau[0]
     before = jnp.full_like(tau, jnp.inf)
+    beyond = plan.beyond_the_mean()
+    counts = jnp.where(beyond | (start == 0), jnp.ones_like(tau), 0)
 
     def unsettled(state):
         m, *_, counts = state
@@ -209,10 +226,10 @@ def over_modes(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
         wanting = plan.wanting(total, jnp.maximum(size, budget.DECAY * before))
-        return m + 1, carry, rows, size, jnp.where(wanting, counts, 0)
+        return m + 1, carry, rows, size, jnp.where(wanting & beyond, counts, 0)
 
     rows = jax.tree.map(jnp.zeros_like, rows)
     _, carry, rows, _, _ = jax.lax.while_loop(
-        unsettled, one, (jnp.int32(start), carry, rows, before, jnp.ones_like(tau))
+        unsettled, one, (jnp.int32(start), carry, rows, before, counts)
     )
     return carry, jax.tree.map(lambda x: x[start:], rows)
