@@ -5,10 +5,11 @@ pixel and with its exact derivatives, and score what comes out against the truth
 is a `StateVector`, a list of `Quantity`: `declarations` has those of smoke, ash, dust, liquid
 cloud, fire and ground, and one of your own is another list. `retrieve_image` inverts the result of
 a simulation (`retrieve_kind` one of the shipped ones), `retrieve_pixels` any measurements
-(`measurement`) and states, fires among them; `ForwardModel` and
-`invert` are the parts of which both are made; `retrievals.scoring` holds the yardsticks.
+(`measurement`) and states; `ForwardModel` and `invert` are the parts of which both are made;
+`retrievals.scoring` holds the yardsticks.
 """
 
+from .fires import retrieve_fires as retrieve_fires
 from .forward import ForwardModel as ForwardModel
 from .forward import prepared as prepared
 from .images import retrieve_image as retrieve_image

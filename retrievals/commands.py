@@ -1,7 +1,7 @@
 """Commands that `abi_operator`'s command line finds by their entry points."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 import xarray as xr
@@ -9,7 +9,9 @@ import xarray as xr
 from abi_operator.bands import check_bands
 from abi_operator.commands import one_sentence, typed
 from abi_operator.files import InputError, output_folder, read_result
+from abi_operator.radiance import FIRE_BANDS
 
+from .fires import BACKGROUNDS
 from .images import REFLECTIVE
 from .kinds import KINDS, retrieve_kind, retrieve_smoke, vector_of
 from .prior_file import read_prior
@@ -23,12 +25,18 @@ def retrieve(
     context: typer.Context,
     kind: Annotated[str, typer.Argument(help=f"What to retrieve: {', '.join(KINDS)}.")],
     result: Annotated[
-        Path, typer.Argument(help="result.nc of a simulation with such a plume, or with cloud.")
+        Path,
+        typer.Argument(
+            help="result.nc of a simulation with such a plume, with cloud, or with C07 for fires."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="File to write, NetCDF.")],
     bands: Annotated[
         str | None,
-        typer.Option(help="Bands to retrieve from; C01,C02,C03 of plumes and C02,C06 of cloud."),
+        typer.Option(
+            help="Bands to retrieve from; C01,C02,C03 of plumes, C02,C06 of cloud and C05,C06,C07 "
+            "of fires."
+        ),
     ] = None,
     retrieve_ssa: Annotated[
         bool,
@@ -55,19 +63,31 @@ def retrieve(
         bool,
         typer.Option(help="Write averaging kernels, gains and errors by source, too."),
     ] = False,
+    background: Annotated[
+        str | None,
+        typer.Option(
+            help="How the ground beside a fire is known: 'stored' (the default), as the result "
+            "says, or 'neighbours', as the pixels around it show."
+        ),
+    ] = None,
 ) -> None:
-    """Retrieve a plume or cloud from a simulated result."""
+    """Retrieve a plume, cloud or fires from a simulated result."""
     if kind not in KINDS:
         raise typer.BadParameter(f"cannot retrieve {kind!r}; choose from {', '.join(KINDS)}.")
     try:
         chosen = (
             None
             if bands is None
-            else check_bands([band.strip() for band in bands.split(",")], REFLECTIVE)
+            else check_bands(
+                [band.strip() for band in bands.split(",")],
+                FIRE_BANDS if kind == "fire" else REFLECTIVE,
+            )
         )
+        _check_background(kind, background)
         vector = vector_of(kind, retrieve_ssa, effective_radius)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+    how: dict[str, Any] = {} if background is None else {"background": background}
     with one_sentence(), read_result(result) as dataset:
         retrieval = retrieve_kind(
             dataset,
@@ -79,12 +99,20 @@ def retrieve(
             seed=seed,
             prior=None if prior is None else read_prior(prior, vector),
             diagnostics=diagnostics,
+            **how,
         )
         # The latest event first, as `history` has it.
         event = f"{retrieval.attrs['history']}: {typed(context)}"
         retrieval.attrs["history"] = "\n".join([event, str(dataset.attrs["history"])])
         _write(retrieval, out)
     typer.echo(f"wrote {out}")
+
+
+def _check_background(kind: str, background: str | None) -> None:
+    if background is not None and kind != "fire":
+        raise ValueError(f"--background is of fires; {kind} has none.")
+    if background not in (None, *BACKGROUNDS):
+        raise ValueError(f"no background {background!r}; choose from {', '.join(BACKGROUNDS)}.")
 
 
 def score(

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from abi_operator import LiquidCloud, MiePlume, Plume
+from abi_operator import Fire, LiquidCloud, MiePlume, Plume
 from abi_operator.constants import WATER_DENSITY
 from abi_operator.optics import effective_radius, mie_optics
 
@@ -24,6 +24,9 @@ SCANNED_AOD_550 = (0.02, 0.06, 0.15, 0.35, 0.8, 1.8, 4.5)
 """Optical depths of a scan; those above a limit are left out. [-]"""
 AOD_LIMIT = 10.0
 """Optical depth that plumes stay below where nothing else is asked for. [-]"""
+
+STEFAN_BOLTZMANN = 5.670374419e-8
+"""Exact in the SI of 2019: CODATA 2018. [W m-2 K-4]"""
 
 _MICRON = 1e-6  # [m]
 # Effective radii that a table is meant for, and where a scan looks. [um]
@@ -216,7 +219,37 @@ def fire() -> StateVector:
         get=itself,
         starts=(3e-4, 3e-3, 3e-2),
     )
-    return StateVector((temperature, fraction))
+    power = Derived(
+        "fire_emitted_power",
+        "W m-2",
+        "power that the fire emits per area of the pixel",
+        "fire",
+        emitted_power,
+    )
+    return StateVector((temperature, fraction), (power,))
+
+
+def assumed_of_fire(bands: Sequence[str]) -> StateVector:
+    """What a retrieval of a fire assumes of the ground: its albedo, to 0.01, and its heat, to 1 K.
+
+    A fire emits 1 minus the albedo of what a black one would.
+    """
+    ground = Quantity(
+        "surface_temperature",
+        "K",
+        "temperature of the ground beside the fire",
+        "surface_temperature",
+        Unbounded(),
+        replaced,
+        sigma=1.0,
+        get=itself,
+    )
+    return StateVector((*(albedo(band) for band in bands), ground))
+
+
+def emitted_power(fire: Fire) -> Float[Array, "*batch"]:
+    """Power of a black fire per area of the pixel, p sigma T^4, better known than both. [W m-2]"""
+    return STEFAN_BOLTZMANN * fire.fraction * fire.temperature**4
 
 
 def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:

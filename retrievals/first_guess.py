@@ -49,7 +49,7 @@ def scan(
     starts = guesses(forward.vector, state)
 
     def cost(x: Float[Array, " x"]) -> Float[Array, ""]:
-        return jnp.sum(observation.residual(forward(x, state)) ** 2)
+        return jnp.sum(observation.departure(forward, x, state) ** 2)
 
     return jax.lax.map(cost, starts), starts
 

@@ -39,7 +39,7 @@ class ForwardModel:
     gases
         Gases of the state that absorb.
     satellite
-        Whose response and solar irradiance; the sun is at 1 AU, which the radiance of C07 tells.
+        Whose response and solar irradiance.
     """
 
     vector: StateVector
@@ -53,12 +53,30 @@ class ForwardModel:
         """Put x into a state."""
         return self.vector.state(x, state)
 
-    def __call__(self, x: Float[Array, "*batch x"], state: State) -> Float[Array, "*batch band"]:
+    def __call__(
+        self,
+        x: Float[Array, "*batch x"],
+        state: State,
+        sun_distance: Float[Array | np.ndarray, "*batch"] | None = None,
+    ) -> Float[Array, "*batch band"]:
+        """What is measured of a state into which x is put (`measured`)."""
+        return self.measured(self.state(x, state), sun_distance)
+
+    def measured(
+        self, full: State, sun_distance: Float[Array | np.ndarray, "*batch"] | None = None
+    ) -> Float[Array, "*batch band"]:
         """Reflectance factors of C01 to C06 [-], and the radiance of C07 [W m-2 sr-1 um-1].
 
         Where there is a fire, what it gives off is part of the reflectance factors.
+
+        Parameters
+        ----------
+        full
+            The state, with all that is retrieved.
+        sun_distance
+            Distance of the sun [AU], None for 1: beside what the ground and a fire give off,
+            sunlight counts for less the farther the sun is. Reflected light alone does not tell.
         """
-        full = self.state(x, state)
         settings = {
             "gases": self.gases,
             "num_streams": self.num_streams,
@@ -67,11 +85,12 @@ class ForwardModel:
         }
         if THERMAL not in self.bands and full.fire is None:
             return reflectance_factor(full, self.bands, **settings)
-        seen = radiance(full, self.bands, **settings)
+        distance = 1.0 if sun_distance is None else jnp.asarray(sun_distance)
+        seen = radiance(full, self.bands, sun_distance=distance, **settings)
         columns = [
             seen[..., i]
             if band == THERMAL
-            else reflectance_factor_from_radiance(seen[..., i], band, self.satellite)
+            else reflectance_factor_from_radiance(seen[..., i], band, self.satellite, distance)
             for i, band in enumerate(self.bands)
         ]
         return jnp.stack(columns, axis=-1)

@@ -20,7 +20,7 @@ from .observation import Observation, add_noise, observe, usable
 from .optimal_estimation import estimates
 from .pixels import retrieve_pixels
 from .prior import Prior
-from .product import diagnostic_fields, make_product, pixel_fields
+from .product import Field, diagnostic_fields, make_product, pixel_fields
 from .results import ResultCode
 from .state_vector import StateVector
 
@@ -101,46 +101,100 @@ def retrieve_image(
     bands = check_bands(bands, REFLECTIVE)
     _check(dataset, bands, species, vector.size, prior)
     if num_streams is None:
-        num_streams = int(dataset.attrs.get("num_streams", 8))
+        num_streams = streams_of(dataset)
     with jax.enable_x64(True):
         if noise:
             noisy = add_noise(dataset["reflectance_factor"], seed)
             dataset = dataset.assign(reflectance_factor=noisy)
-        images = _images(dataset)
+        images = images_of(dataset)
         codes = np.stack([usable(image, bands, species, where) for image in images])
         attempted = codes == ResultCode.SUCCESS
         fields = {}
         if attempted.any():
             observations, states = _gather(images, attempted, bands)
-            satellite = str(dataset.attrs.get("satellite", IMAGER.satellite))
-            forward = ForwardModel(
-                vector, bands, num_streams, gases=gases_of(dataset), satellite=satellite
-            )
-            forward = prepared(forward, states)
-            of_x = prior.prior(states) if isinstance(prior, StateVector) else prior
-            retrieved = retrieve_pixels(
-                forward,
+            fields, codes[attempted] = retrieved_fields(
+                forward_model(dataset, vector, bands, num_streams),
                 observations,
                 states,
-                prior=of_x,
+                prior=prior,
                 minimiser=minimiser,
-                exact=not noise and prior is None,
+                exact=not noise and prior is None and solved_whole(dataset),
+                diagnostics=diagnostics,
+                assumed=assumed,
             )
-            fields = pixel_fields(vector, retrieved, states, observations.num_values)
-            if diagnostics:
-                x = np.asarray(retrieved.inversion.x)
-                found = estimates(forward, observations, states, x, of_x, assumed)
-                fields |= diagnostic_fields(vector, x, found, assumed)
-            codes[attempted] = retrieved.codes
-    about = {
+    about = how_made(bands, num_streams, noise, seed, prior)
+    about |= {} if species is None else {"species": species}
+    about |= attributes or {}
+    return make_product(dataset, codes, attempted, fields, (bands, vector.names), about)
+
+
+def retrieved_fields(
+    forward: ForwardModel,
+    observations: Observation,
+    states: State,
+    *,
+    prior: Prior | StateVector | None,
+    minimiser: Minimiser,
+    exact: bool,
+    diagnostics: bool,
+    assumed: StateVector | None,
+) -> tuple[dict[str, Field], np.ndarray]:
+    """Variables of a product, of the pixels in one row, and their result codes.
+
+    Parameters
+    ----------
+    forward
+        The forward model, not yet `prepared`.
+    observations, states
+        What was measured and what is known of the pixels.
+    exact
+        As of `retrieve_pixels`.
+    prior, minimiser, diagnostics, assumed
+        As of `retrieve_image`.
+    """
+    vector, forward = forward.vector, prepared(forward, states)
+    of_x = prior.prior(states) if isinstance(prior, StateVector) else prior
+    retrieved = retrieve_pixels(
+        forward, observations, states, prior=of_x, minimiser=minimiser, exact=exact
+    )
+    fields = pixel_fields(vector, retrieved, states, observations.num_values)
+    if diagnostics:
+        x = np.asarray(retrieved.inversion.x)
+        found = estimates(forward, observations, states, x, of_x, assumed)
+        fields |= diagnostic_fields(vector, x, found, assumed)
+    return fields, retrieved.codes
+
+
+def forward_model(
+    dataset: xr.Dataset, vector: StateVector, bands: tuple[str, ...], num_streams: int | None
+) -> ForwardModel:
+    """The operator as a result was simulated by it; streams are those of the result for None."""
+    if num_streams is None:
+        num_streams = streams_of(dataset)
+    satellite = str(dataset.attrs.get("satellite", IMAGER.satellite))
+    return ForwardModel(vector, bands, num_streams, gases=gases_of(dataset), satellite=satellite)
+
+
+def streams_of(dataset: xr.Dataset) -> int:
+    """Streams of the solver that made a result."""
+    return int(dataset.attrs.get("num_streams", 8))
+
+
+def solved_whole(dataset: xr.Dataset) -> bool:
+    """Whether a result has no error of its making, for which a fit could not be exact."""
+    return "error_budget" not in dataset.attrs
+
+
+def how_made(
+    bands: tuple[str, ...], num_streams: int, noise: bool, seed: int, prior: object
+) -> dict[str, Any]:
+    """Attributes of a product that tell how it was made."""
+    return {
         "bands": " ".join(bands),
         "num_streams": num_streams,
         "noise": f"added with seed {seed}" if noise else "none",
         "prior": "none" if prior is None else "normal distribution",
     }
-    about |= {} if species is None else {"species": species}
-    about |= attributes or {}
-    return make_product(dataset, codes, attempted, fields, (bands, vector.names), about)
 
 
 def _check(
@@ -172,7 +226,7 @@ def _check(
         )
 
 
-def _images(dataset: xr.Dataset) -> list[xr.Dataset]:
+def images_of(dataset: xr.Dataset) -> list[xr.Dataset]:
     """The times of a Dataset."""
     if "time" not in dataset.dims:
         return [dataset]

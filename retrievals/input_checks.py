@@ -70,4 +70,10 @@ def checked(
     saturated = observations.saturated
     if saturated is None:
         saturated = np.zeros(measured.shape, bool)
-    return codes, Observation(measured, np.where(sigma > 0, sigma, 1), np.asarray(saturated)), prior
+    kept = Observation(
+        measured,
+        np.where(sigma > 0, sigma, 1),
+        np.asarray(saturated),
+        observations.sun_distance,
+    )
+    return codes, kept, prior

@@ -150,7 +150,7 @@ def invert(
     root = jnp.eye(x_first.size, dtype=x_first.dtype) if prior is None else prior.root
 
     def whitened(z: Float[Array, " x"]) -> Float[Array, " residual"]:
-        measurement = observation.residual(forward(origin + root @ z, state))
+        measurement = observation.departure(forward, origin + root @ z, state)
         return measurement if prior is None else jnp.concatenate([measurement, z])
 
     def linearised(z: Float[Array, " x"], _: None) -> tuple[Array, tuple[Array, Array, Array]]:

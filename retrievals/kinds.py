@@ -5,7 +5,10 @@ from typing import Any, Literal, NamedTuple
 
 import xarray as xr
 
-from .declarations import AOD_LIMIT, assumed_of_plume, liquid_cloud, plume
+from abi_operator.radiance import FIRE_BANDS
+
+from .declarations import AOD_LIMIT, assumed_of_plume, fire, liquid_cloud, plume
+from .fires import retrieve_fires
 from .images import retrieve_image
 from .state_vector import StateVector
 
@@ -21,7 +24,7 @@ class Kind(NamedTuple):
     bands
         Bands that tell of it.
     species
-        Name of the plume in a scenario, None for cloud.
+        Name of the plume in a scenario, None for cloud and fire.
     """
 
     bands: tuple[str, ...]
@@ -33,9 +36,9 @@ KINDS = {
     "ash": Kind(BANDS, "ash"),
     "dust": Kind(BANDS, "dust"),
     "cloud": Kind(("C02", "C06"), None),
+    "fire": Kind(FIRE_BANDS, None),
 }
-"""Retrievals from the result of a simulation, which holds no fires: those are retrieved by
-`retrieve_pixels` from `declarations.fire`."""
+"""Retrievals from the result of a simulation."""
 
 
 def retrieve_kind(
@@ -46,7 +49,7 @@ def retrieve_kind(
     retrieve_ssa: bool = False,
     effective_radius: bool = False,
     aod_limit: float = AOD_LIMIT,
-    where: Literal["plume", "cloud", "all"] | None = None,
+    where: Literal["plume", "cloud", "detected", "all"] | None = None,
     **how: Any,
 ) -> xr.Dataset:
     """Retrieve one of `KINDS` from the result of a simulation.
@@ -54,7 +57,7 @@ def retrieve_kind(
     Parameters
     ----------
     dataset, **how
-        As of `retrieve_image`.
+        As of `retrieve_image`, or of fire as of `retrieve_fires`.
     kind
         One of `KINDS`.
     bands
@@ -67,7 +70,8 @@ def retrieve_kind(
     aod_limit
         Optical depths of a plume from here on are out of reach. [-]
     where
-        As of `retrieve_image`; None for where there is a plume, or cloud.
+        As of `retrieve_image` or `retrieve_fires`; None for where there is a plume, or cloud, or
+        where a fire is detected.
     """
     chosen = KINDS[kind]
     bands = chosen.bands if bands is None else tuple(bands)
@@ -78,13 +82,14 @@ def retrieve_kind(
         "kind": kind,
         "retrieved": " ".join(vector.names),
     }
+    if kind == "fire":
+        how = how if where is None else how | {"where": where}
+        return retrieve_fires(dataset, bands=bands, attributes=about, **how)
     if species is not None:
         about["aod_limit"] = aod_limit
         how.setdefault("assumed", assumed_of_plume(species, bands))
-    where = where or ("cloud" if species is None else "plume")
-    return retrieve_image(
-        dataset, vector, bands=bands, species=species, where=where, attributes=about, **how
-    )
+    how["where"] = where or ("cloud" if species is None else "plume")
+    return retrieve_image(dataset, vector, bands=bands, species=species, attributes=about, **how)
 
 
 def vector_of(
@@ -98,13 +103,17 @@ def vector_of(
     Raises
     ------
     ValueError
-        Where cloud is to have a single-scattering albedo that is retrieved.
+        Where cloud is to have a single-scattering albedo that is retrieved, or a fire particles.
     """
     species = KINDS[kind].species
     if species is not None:
         return plume(
             species, ssa=retrieve_ssa, effective_radius=effective_radius, aod_limit=aod_limit
         )
+    if kind == "fire":
+        if retrieve_ssa or effective_radius:
+            raise ValueError("a fire has no particles whose size or absorption could be retrieved.")
+        return fire()
     if retrieve_ssa:
         raise ValueError("the single-scattering albedo of cloud is that of water.")
     return liquid_cloud()

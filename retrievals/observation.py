@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, ArrayLike, Bool, Float
 
-from abi_operator import BANDS
+from abi_operator import BANDS, State
 from abi_operator.instrument import (
     IMAGER,
     Imager,
@@ -21,7 +21,7 @@ from abi_operator.instrument import (
 )
 from abi_operator.nomenclature import QUALITY_FLAGS
 
-from .forward import THERMAL
+from .forward import THERMAL, ForwardModel
 from .results import ResultCode
 
 LARGEST_REFLECTANCE_FACTOR = 2.0
@@ -30,7 +30,7 @@ LARGEST_REFLECTANCE_FACTOR = 2.0
 _ATTEMPTED = ResultCode.SUCCESS
 # Flags of pixels that are not attempted. Optics beyond what they were fitted to are no reason: the
 # retrieval's operator has the same.
-_UNUSABLE = sum(bit for name, bit in QUALITY_FLAGS.items() if name != "outside_fit")
+UNUSABLE = sum(bit for name, bit in QUALITY_FLAGS.items() if name != "outside_fit")
 # How far a saturated band may be exceeded before its likelihood no longer changes, in sigma. [-]
 _ENOUGH = 6.0
 
@@ -50,11 +50,14 @@ class Observation(eqx.Module):
         Standard deviation of the noise, in the same units.
     saturated
         Which bands are saturated; their `measured` is the ceiling. None if none is.
+    sun_distance
+        Distance of the sun [AU], None for 1 (`ForwardModel.measured`).
     """
 
     measured: Float[Array | np.ndarray, "*batch band"]
     sigma: Float[Array | np.ndarray, "*batch band"]
     saturated: Bool[Array | np.ndarray, "*batch band"] | None = None
+    sun_distance: Float[Array | np.ndarray, "*batch"] | None = None
 
     @property
     def present(self) -> Bool[Array, "*batch band"]:
@@ -68,6 +71,17 @@ class Observation(eqx.Module):
         if self.saturated is not None:
             counts &= ~np.asarray(self.saturated)
         return counts.sum(axis=-1)
+
+    def departure(
+        self, forward: ForwardModel, x: Float[Array, "*batch x"], state: State
+    ) -> Float[Array, "*batch band"]:
+        """Residuals of x: what a forward model makes of it where the sun was, less the measurement.
+
+        A forward model of one's own need not know of the sun's distance where there is none.
+        """
+        if self.sun_distance is None:
+            return self.residual(forward(x, state))
+        return self.residual(forward(x, state, jnp.asarray(self.sun_distance)))
 
     def residual(self, predicted: Float[Array, "*batch band"]) -> Float[Array, "*batch band"]:
         r"""Whitened departures of a forward model from the measurement, 0 in missing bands. [-]
@@ -128,6 +142,7 @@ def measurement(
     *,
     calibration: bool = False,
     forward_error: float = 0.0,
+    sun_distance: Float[ArrayLike, "*batch"] | None = None,
 ) -> Observation:
     """An observation with the noise and the ceilings of the instrument.
 
@@ -143,17 +158,25 @@ def measurement(
         in every pixel and band.
     forward_error
         Relative standard deviation of what the forward model itself is wrong by, in each band. [-]
+    sun_distance
+        Distance of the sun, None for 1. [AU]
     """
     values = np.asarray(measured, np.result_type(float))
     relative = np.zeros(len(bands))
     if calibration:
         relative = np.array([float(imager.noise.calibration.get(band, 0.0)) for band in bands])
     tops = np.array([ceiling(band, imager) for band in bands], values.dtype)
+    distance = None
+    if sun_distance is not None:  # ceilings are those of radiance
+        distance = np.broadcast_to(np.asarray(sun_distance, values.dtype), values.shape[:-1])
+        reflective = np.array([band != THERMAL for band in bands])
+        tops = np.where(reflective, tops * distance[..., None] ** 2, tops)
     saturated = values >= tops
     values = np.where(saturated, tops, values)
     columns = [noise_sigma(values[..., i], band, imager) for i, band in enumerate(bands)]
     other = np.hypot(relative, forward_error).astype(values.dtype) * values
-    return Observation(values, np.hypot(np.stack(columns, axis=-1), other), saturated)
+    sigma = np.hypot(np.stack(columns, axis=-1), other)
+    return Observation(values, sigma, saturated, distance)
 
 
 def add_noise(reflectance_factor: xr.DataArray, seed: int, imager: Imager = IMAGER) -> xr.DataArray:
@@ -203,7 +226,7 @@ def usable(
     codes = np.full((image.sizes["y"], image.sizes["x"]), _ATTEMPTED, np.int8)
     measured = image["reflectance_factor"].sel(band=list(bands)).transpose("band", "y", "x")
     codes[~np.isfinite(measured.values).any(axis=0)] = ResultCode.INVALID_INPUT
-    codes[(image["quality_flag"].values & _UNUSABLE) != 0] = ResultCode.UNUSABLE
+    codes[(image["quality_flag"].values & UNUSABLE) != 0] = ResultCode.UNUSABLE
     if where == "plume" and species is not None:
         codes[~(image[f"{species}_brightness"].values > 0)] = ResultCode.NO_PLUME
     if where == "cloud":

@@ -150,7 +150,7 @@ def _estimate(
 
     def whitened(both: Float[Array, " x_and_parameter"]) -> Float[Array, " band"]:
         known = state if assumed is None else assumed.state(both[size:], state)
-        return observation.residual(forward(both[:size], known))
+        return observation.departure(forward, both[:size], known)
 
     both = jnp.concatenate([x, parameters])
     residual, slopes = value_and_jacobian(whitened, both)

@@ -28,8 +28,8 @@ class ResultCode(enum.IntEnum):
 _MESSAGES = {
     ResultCode.SUCCESS: "Retrieved.",
     ResultCode.NO_PLUME: (
-        "Not attempted: there is no plume, or no cloud, to be retrieved here; where='all' attempts "
-        "every pixel."
+        "Not attempted: there is no plume, no cloud, or no fire that stands out, to be retrieved "
+        "here; where='all' attempts every pixel."
     ),
     ResultCode.UNUSABLE: (
         "Not attempted: quality_flag reports night, a grazing sun or view, or missing albedo."

@@ -1,0 +1,280 @@
+"""Fires from the result of a simulation: temperature, burning share and emitted power.
+
+A fire shines in C05, C06 and C07, by day and by night, and is measured there as radiance: what a
+result calls so, sunlight and heat together. Pixels are attempted where they stand out of their
+surroundings (`fire_detection`); whether the result says where it burns is not looked at. A band
+that is saturated is a lower bound, and ``num_values`` tells how many bands are not.
+
+What does not burn in a pixel is known in one of two ways. *Stored*: the ground's temperature and
+albedo are those of the result, and the whole pixel is modelled. *Neighbours*: what the surrounding
+pixels show on average is taken for what this one would show without fire, and their spread is part
+of its error; modelled is no more than what the fire adds. The shift of the measurement
+
+.. math:: L' = L - \\bar L + F(p = 0), \\qquad \\sigma'^2 = \\sigma_\\epsilon^2 + s^2
+
+does so with the same forward model F, in which the fire has no share p.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from abi_operator import Fire, State
+from abi_operator.bands import check_bands
+from abi_operator.files import InputError
+from abi_operator.instrument import IMAGER, Imager, reflectance_factor_from_radiance
+from abi_operator.machine.speed import Kept
+from abi_operator.nomenclature import QUALITY_FLAGS, SCENARIO
+from abi_operator.radiance import FIRE_BANDS
+from abi_operator.scene import column_states
+from abi_operator.scene.angles import sun_distance
+
+from .chunks import map_chunks
+from .declarations import assumed_of_fire, fire
+from .fire_detection import DETECTED, Surroundings, surroundings
+from .forward import THERMAL, ForwardModel, prepared
+from .images import (
+    forward_model,
+    how_made,
+    images_of,
+    retrieved_fields,
+    solved_whole,
+    streams_of,
+)
+from .inverse import DEFAULT_MINIMISER, Minimiser
+from .observation import UNUSABLE, Observation, add_noise, measurement
+from .prior import Prior
+from .product import make_product
+from .results import ResultCode
+from .state_vector import StateVector
+
+SCORE = "fire_detection_score"
+"""Variable of the product: the score of `fire_detection` at every pixel."""
+
+BACKGROUNDS = ("stored", "neighbours")
+Background = Literal["stored", "neighbours"]
+
+# A fire shines by night too.
+_UNUSABLE = UNUSABLE & ~QUALITY_FLAGS["night"]
+_HEAT = ("temperature", "surface_temperature")
+
+
+def retrieve_fires(
+    dataset: xr.Dataset,
+    *,
+    bands: Sequence[str] = FIRE_BANDS,
+    background: Background = "stored",
+    where: Literal["detected", "all"] = "detected",
+    threshold: float = DETECTED,
+    noise: bool = False,
+    seed: int = 0,
+    prior: Prior | StateVector | None = None,
+    assumed: StateVector | None = None,
+    diagnostics: bool = False,
+    num_streams: int | None = None,
+    minimiser: Minimiser = DEFAULT_MINIMISER,
+    attributes: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Retrieve fires from the result of a simulation, pixel by pixel, in float64.
+
+    Parameters
+    ----------
+    dataset
+        A result with dimensions y and x, and time if there are several, with temperatures (one that
+        was simulated with C07 has them).
+    bands
+        Bands to be used, of C05, C06 and C07. Where one is not finite it is left out.
+    background
+        One of `BACKGROUNDS`.
+    where, threshold
+        ``"detected"``: where the score of `fire_detection` reaches the threshold; ``"all"``: at
+        every usable pixel.
+    assumed
+        What is not retrieved, for the diagnostics; None for `assumed_of_fire`.
+    noise, seed, prior, diagnostics, num_streams, minimiser, attributes
+        As of `retrieve_image`. Noise is drawn before fires are looked for.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `retrieve_image`, with ``fire_temperature``, ``fire_fraction``, ``fire_emitted_power``
+        and the ``fire_detection_score`` of every pixel.
+
+    Raises
+    ------
+    InputError
+        Where the Dataset lacks a variable or a band.
+    ValueError
+        Where a band is none in which a fire shines, or background is none of `BACKGROUNDS`.
+    """
+    bands, vector = check_bands(bands, FIRE_BANDS), fire()
+    if background not in BACKGROUNDS:
+        raise ValueError(f"background must be one of {', '.join(BACKGROUNDS)}; got {background!r}.")
+    _check(dataset, bands, vector.size, prior)
+    num_streams = streams_of(dataset) if num_streams is None else num_streams
+    with jax.enable_x64(True):
+        forward = forward_model(dataset, vector, bands, num_streams)
+        imager = Imager(forward.satellite, noise=IMAGER.noise)
+        images = images_of(dataset)
+        measured = _measured(images, bands, imager)
+        if noise:
+            measured = add_noise(measured, seed, imager)
+        measured = measured.transpose("image", "band", "y", "x").values
+        around = [
+            _surroundings(image, values, bands, imager, threshold)
+            for image, values in zip(images, measured, strict=True)
+        ]
+        codes = np.stack(
+            [
+                _codes(image, values, found, threshold if where == "detected" else -np.inf)
+                for image, values, found in zip(images, measured, around, strict=True)
+            ]
+        )
+        attempted = codes == ResultCode.SUCCESS
+        fields = {}
+        if attempted.any():
+            rows = zip(images, measured, around, attempted, strict=True)
+            parts = [_gathered(forward, imager, *row, background) for row in rows if row[3].any()]
+            observations, states = jax.tree.map(lambda *x: np.concatenate(x), *parts)
+            exact = not noise and prior is None and background == "stored"
+            fields, codes[attempted] = retrieved_fields(
+                forward,
+                observations,
+                states,
+                prior=prior,
+                minimiser=minimiser,
+                exact=exact and solved_whole(dataset),
+                diagnostics=diagnostics,
+                assumed=assumed_of_fire(bands) if assumed is None else assumed,
+            )
+    about = how_made(bands, num_streams, noise, seed, prior) | {
+        "background": background,
+        "detection_threshold": threshold,
+    }
+    about |= attributes or {}
+    product = make_product(dataset, codes, attempted, fields, (bands, vector.names), about)
+    score = np.stack([found.score for found in around])
+    words = "excess over the surroundings, in standard deviations of these and of the noise"
+    product[SCORE] = (
+        product["result_code"].dims,
+        score if "time" in dataset.dims else score[0],
+        {"units": "1", "long_name": words},
+    )
+    return product
+
+
+def _check(dataset: xr.Dataset, bands: tuple[str, ...], num_unknowns: int, prior: object) -> None:
+    """Raise `InputError` for what the Dataset lacks."""
+    missing = [x for x in ("radiance", *SCENARIO, *_HEAT) if x not in dataset.variables]
+    if missing:
+        raise InputError(
+            f"the result has no {', '.join(missing)}; simulate a scene with C07, and keep all of "
+            "it (abi-operator simulate --bands all --emissivity ..., without --variables)."
+        )
+    lacking = sorted(set(bands) - set(dataset["band"].values.tolist()))
+    if lacking:
+        raise InputError(
+            f"the result has no band {', '.join(lacking)}; simulate it, or choose other bands."
+        )
+    if prior is None and len(bands) < num_unknowns:
+        raise InputError(
+            f"{num_unknowns} unknowns need as many bands, or a prior; got {', '.join(bands)}."
+        )
+
+
+def _distance(image: xr.Dataset) -> float:
+    """Distance of the sun at the time of an image, as it was simulated. [AU]"""
+    return sun_distance(image["time"].values) if "time" in image.variables else 1.0
+
+
+def _measured(images: Sequence[xr.Dataset], bands: tuple[str, ...], imager: Imager) -> xr.DataArray:
+    """Reflectance factor, or radiance in C07, of all the light that arrives."""
+    parts = []
+    for image in images:
+        distance = _distance(image)
+        seen = image["radiance"].sel(band=list(bands)).transpose("band", "y", "x")
+        values = seen.values.astype(np.float64)
+        for i, band in enumerate(bands):
+            if band != THERMAL:
+                values[i] = reflectance_factor_from_radiance(
+                    jnp.asarray(values[i]), band, imager.satellite, distance
+                )
+        parts.append(values)
+    return xr.DataArray(np.stack(parts), {"band": list(bands)}, ("image", "band", "y", "x"))
+
+
+def _surroundings(
+    image: xr.Dataset,
+    measured: np.ndarray,
+    bands: tuple[str, ...],
+    imager: Imager,
+    threshold: float,
+) -> Surroundings:
+    """Those of the pixels by day among these, and of the others by night."""
+    night = (image["quality_flag"].values.astype(int) & QUALITY_FLAGS["night"]) != 0
+    dark, lit = (
+        surroundings(np.where(side, measured, np.nan), bands, imager, threshold)
+        for side in (night, ~night)
+    )
+    return Surroundings(*(np.where(night, *pair) for pair in zip(dark, lit, strict=True)))
+
+
+def _codes(
+    image: xr.Dataset, measured: np.ndarray, around: Surroundings, threshold: float
+) -> np.ndarray:
+    """Result code of the pixels that are not to be attempted, 0 (success) elsewhere."""
+    codes = np.full(measured.shape[1:], ResultCode.SUCCESS, np.int8)
+    codes[~(around.score >= threshold)] = ResultCode.NO_PLUME
+    codes[~np.isfinite(measured).any(axis=0)] = ResultCode.INVALID_INPUT
+    codes[(image["quality_flag"].values.astype(int) & _UNUSABLE) != 0] = ResultCode.UNUSABLE
+    return codes
+
+
+def _gathered(
+    forward: ForwardModel,
+    imager: Imager,
+    image: xr.Dataset,
+    measured: np.ndarray,
+    around: Surroundings,
+    chosen: np.ndarray,
+    background: Background,
+) -> tuple[Observation, State]:
+    """Measurements and states of the pixels of one image that are attempted."""
+    y, x = np.nonzero(chosen)
+    columns = image.isel(y=xr.DataArray(y, dims="column"), x=xr.DataArray(x, dims="column"))
+    states = with_fire(column_states(columns, forward.bands), 0.0)
+    distance = np.full(len(y), _distance(image))
+    observed = measurement(measured[:, y, x].T, forward.bands, imager, sun_distance=distance)
+    if background == "stored":
+        return observed, states
+    enough = prepared(forward, states)
+    without = map_chunks(partial(_seen_chunk, enough), states, distance)
+    shifted = observed.measured - around.mean[:, y, x].T + without
+    sigma = np.hypot(observed.sigma, around.deviation[:, y, x].T)
+    return Observation(shifted, sigma, observed.saturated, distance), states
+
+
+@Kept
+def _seen_chunk(forward: ForwardModel, states: State, distance: jax.Array) -> jax.Array:
+    return forward.measured(states, distance)
+
+
+def with_fire(states: State, fraction: float, temperature: float = 700.0) -> State:
+    """States, columns leading, in all of which the same burns; what burnt there does no more.
+
+    Parameters
+    ----------
+    states
+        Columns, of which a fire is to be retrieved.
+    fraction, temperature
+        Of the fire [-], [K].
+    """
+    columns: Any = np.ones_like(np.asarray(states.geometry.solar_zenith))
+    burning = Fire(fraction * columns, temperature * columns)
+    return eqx.tree_at(lambda s: s.fire, states, burning, is_leaf=lambda leaf: leaf is None)
