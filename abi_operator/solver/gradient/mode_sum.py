@@ -154,8 +154,9 @@ def _reflectance(
 
             return top(over_layers(add, ground, plan, upwards=True)).reflection()
 
-        # Of one layer that is the only one XLA would find no use for what tells layers apart.
-        if plan.layers.tau.shape[0] > 1:
+        # Of one layer that is the only one XLA would find no use for what tells layers apart, and
+        # what leaves towards several views is a sum that it would share among threads.
+        if plan.layers.tau.shape[0] > 1 and inputs.view_secants.shape[0] == 1:
             of_all = one_kernel(of_all, modes.num_nodes, in_parts=True)
         kernels, views = _kernels(mode.nodes, mode.beams), inputs.view_secants
         ground = modes.ground(mode, mean)
