@@ -187,7 +187,7 @@ def simulate(
         typer.Option(
             min=0,
             help="Relative error of the reflectance that may be made for speed, in 99 of 100 "
-            "pixels; with 0 nothing is left out, as never in C07.",
+            "pixels; with 0 nothing is left out.",
         ),
     ] = ERROR_BUDGET,
     variables: Annotated[

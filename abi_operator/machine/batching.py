@@ -137,7 +137,7 @@ def map_tiles(
     order = place = None
     if need is not None and jax.eval_shape(need, columns) is not None:
         numbers = joined(by_tiles(need)(jax.tree.map(tiled, columns)))
-        order = in_order(numbers)
+        order = jnp.argsort(numbers)
         place = _places(order)
     found = by_tiles(function)(jax.tree.map(lambda x: tiled(x, order), columns))
     return jax.tree.map(lambda x: joined(x, place), found)
@@ -148,11 +148,6 @@ def _taken(x: Array, order: Array | None) -> Array:
     if order is None:
         return x
     return x.at[order].get(mode="promise_in_bounds", unique_indices=True)
-
-
-def in_order(need: Array) -> Array:
-    """Places of columns, those first that need least."""
-    return jnp.argsort(need)
 
 
 def _places(order: Array) -> Array:

@@ -31,7 +31,7 @@ from .sun import sun_path_of
 
 ERROR_BUDGET = 1e-3
 """Relative error of the reflectance of scenes that is spent on speed, unless another is asked for:
-far below the noise of the instrument. [-]"""
+a third of the instrument's noise over a white ground, and less of it over darker ones. [-]"""
 
 # Pixels with one of these flags are not solved; those of a night shine in C07.
 _UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]

@@ -24,8 +24,7 @@ from .column import (
 from .foreknown import need
 from .method.doublings import unknown_doublings
 from .settings import Settings, check_settings
-
-_UNSORTED = 4  # streams up to which an order of columns takes longer to find than it saves
+from .skipping import company
 
 
 def solve(
@@ -125,16 +124,19 @@ class _Program(NamedTuple):
         )
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        skips = self.options.error_budget is not None
-        return chunks_of_columns(self.options.num_streams, leaves[0].dtype, in_order=skips)
+        streams, dtype = self.options.num_streams, leaves[0].dtype
+        return chunks_of_columns(streams, dtype, in_order=self._in_order)
 
     def tile(self, leaves: Leaves) -> int:
         return tile_size(self.options.num_streams, jnp.result_type(*leaves))
 
     def need(self, leaves: Leaves) -> Array | None:
-        if self.options.error_budget is None or self.options.num_streams <= _UNSORTED:
-            return None
-        return need(self._aligned(leaves), self.options)
+        return need(self._aligned(leaves), self.options) if self._in_order else None
+
+    @property
+    def _in_order(self) -> bool:
+        skips = self.options.error_budget is not None
+        return skips and self.options.num_streams >= company.SORTED_FROM
 
     def value(self, leaves: Leaves) -> Any:
         return self._outward(self.solve(self._aligned(leaves), self.options))

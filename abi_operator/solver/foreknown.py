@@ -86,4 +86,4 @@ def _warm(
         dark=sun * known.dark,
         aside=sun * known.aside,
     )
-    return jax.lax.stop_gradient(Warm(of_light, sun, levels[:-1], albedo * seen))
+    return jax.lax.stop_gradient(Warm(of_light, sun, levels, albedo * seen))

@@ -8,7 +8,8 @@ from jaxtyping import Array, Float
 
 from .column import Column, Options
 from .foreknown import expected_of
-from .gradient.mode_sum import How, ModeSum, mode_sum
+from .gradient.mode_sum import ModeSum, mode_sum
+from .gradient.modes import How
 from .method.adding import Emission, Top
 from .method.azimuth import (
     Directions,

@@ -11,7 +11,7 @@ from .foreknown import warm_of
 from .gradient.emission import Given, radiance
 from .gradient.emitting_mode import Heating
 from .gradient.fluxes import spherical_albedo
-from .gradient.mode_sum import How
+from .gradient.modes import How
 from .lit import seen_from, seen_from_the_view, upside_down, weights_of_modes
 from .method.adding import emitting_ground
 from .method.ground import black

@@ -16,19 +16,17 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
 from ..method.adding import Emission, add_emitting_layer, add_layer, top
-from ..method.azimuth import mode_kernels
 from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
-from ..method.ground import black, isotropic
-from ..method.layer import half_layer, node_functions
-from ..method.mode_layers import Layers, Order, read
-from ..skipping.heat import Warm, grouped_jumps, lost
+from ..method.ground import isotropic
+from ..method.layer import half_layer
+from ..method.mode_layers import read
+from ..skipping.heat import Warm, lost
+from ..skipping.merging import summed
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .emitting_mode import (
     Air,
@@ -37,12 +35,8 @@ from .emitting_mode import (
     slope_of_light_from_above,
     slopes_of_mode,
 )
-from .mode import Kernels
-from .mode_sum import How
+from .modes import LATER, WHOLE, How, Mode, along, every_mode
 from .room import Keeper
-
-_LATER = slice(1, None)  # modes but the mean
-_WHOLE = 2  # nodes up to which all layers of all modes are one kernel
 
 
 class Lit(NamedTuple):
@@ -99,7 +93,7 @@ def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     if plan.groups is not None:
         lit, added = _in_groups(lit, given.warm, plan)
     value = partial(_radiance, single_scattering=how.single_scattering)
-    return added + (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(lit, plan)
+    return added + (one_kernel(value, num_nodes) if num_nodes <= WHOLE else value)(lit, plan)
 
 
 def _plan(lit: Lit, given: Given, how: How) -> Plan:
@@ -115,26 +109,26 @@ def _plan(lit: Lit, given: Given, how: How) -> Plan:
         warm.known,
         how.error_budget,
         how.most,
-        warm=(warm, lit.heating.jumps),
+        warm=warm,
     )
 
 
 def _in_groups(lit: Lit, warm: Warm | None, plan: Plan) -> tuple[Lit, Float[Array, "*batch"]]:
     """The groups of layers, and unscattered thermal light that they do not have."""
     assert warm is not None and plan.groups is not None
-    tau, coalbedo, sun_secants, moments = plan.layers
-    jumps = grouped_jumps(plan.groups, lit.heating.jumps)
-    members = lit.air.layers.tau, lit.air.layers.coalbedo, lit.heating.jumps
+    alone, layers = lit.air.layers, plan.layers.as_layers()
+    jumps = summed(plan.groups, lit.heating.jumps)
+    members = alone.tau, alone.coalbedo, lit.heating.jumps
+    solved = layers.tau, layers.coalbedo, jumps
     how = lit.air.view_secants[0], 2 * _num_nodes(lit)
-    added = lost(warm, plan.groups, members, (tau, coalbedo, jumps), *how)
-    layers = Layers(tau, coalbedo, sun_secants, jnp.concatenate(moments))
-    air = lit.air._replace(layers=layers)
-    return lit._replace(air=air, heating=lit.heating._replace(jumps=jumps)), added
+    added = lost(warm, plan.groups, members, solved, *how)
+    air, heating = lit.air._replace(layers=layers), lit.heating._replace(jumps=jumps)
+    return lit._replace(air=air, heating=heating), added
 
 
 def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*batch"]:
     how = plan, single_scattering
-    every = _modes(lit)
+    every = _every(lit)
     first = jax.tree.map(lambda x: x[0], every)
     light, one = _of_ground(lit), _one(lit)
     stack, light = _stacked(lit, first, lit.ground, light, *how)
@@ -144,8 +138,7 @@ def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*b
     mean = first.weight * closed.reflection()[0] + emitted
 
     def plus(total, mode, counts):
-        ground = _nothing_below(lit) if mode.ground is None else mode.ground
-        stack, _ = _stacked(lit, mode, ground, None, *how)
+        stack, _ = _stacked(lit, mode, mode.below(lit.ground, mean=False), None, *how)
         found = counts * mode.weight * top(stack).reflection()[0]
         return total + found, None, (total + found)[None], jnp.abs(found)
 
@@ -154,7 +147,7 @@ def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*b
 
 def _stacked(
     lit: Lit,
-    mode: "_Mode",
+    mode: Mode,
     ground: Bordered,
     light: Emission | None,
     plan: Plan,
@@ -186,7 +179,7 @@ def _stacked(
 
     if plan.layers.tau.shape[0] > 1:
         of_all = one_kernel(of_all, _num_nodes(lit), in_parts=True)
-    shared = lit.air, lit.heating.jumps, plan, mode.order.odd, _kernels(mode), _one(lit)
+    shared = lit.air, lit.heating.jumps, plan, mode.order.odd, mode.kernels(), _one(lit)
     return of_all((ground, light), *shared)
 
 
@@ -200,11 +193,7 @@ def _of_ground(lit: Lit) -> Emission:
 def _radiance_jvp(how, primals, tangents):
     lit, given = primals
     value, gradient = radiance_and_gradient(lit, given.doublings, how.single_scattering)
-    change = jnp.zeros_like(value)
-    for slope, tangent in zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents[0]), strict=True):
-        if not isinstance(tangent, SymbolicZero):
-            change = change + jnp.sum(slope * tangent, axis=tuple(range(slope.ndim - value.ndim)))
-    return value, change
+    return value, along(gradient, tangents[0], value)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
@@ -230,8 +219,8 @@ def radiance_and_gradient(
             doublings,
             single_scattering,
             mode.order,
-            _kernels(mode),
-            _ground(lit, mode),
+            mode.kernels(),
+            mode.below(lit.ground),
             column,
             radiance_at_the_top(above, mode.weight),
             slopes,
@@ -249,10 +238,10 @@ def radiance_and_gradient(
     mean = lit.ground if lit.grounds is None else None, lit.heating
     nothing = jax.tree.map(jnp.zeros_like, (lit.heating.above, lit.air, mean))
     space = Keeper(lit.air.layers.tau, _num_nodes(lit), doublings.most, warm=True).empty()
-    carry, rows = jax.lax.scan(step, (*nothing, space), _modes(lit))
+    carry, rows = jax.lax.scan(step, (*nothing, space), _every(lit))
     (value, air, (ground, heating), _), (reflections, beams, grounds) = carry, rows
     if grounds is not None:
-        ground, grounds = (jax.tree.map(lambda x, i=i: x[i], grounds) for i in (0, _LATER))
+        ground, grounds = (jax.tree.map(lambda x, i=i: x[i], grounds) for i in (0, LATER))
     return value, Lit(air, beams, ground, grounds, reflections, heating)
 
 
@@ -266,48 +255,8 @@ def _second_derivative(single_scattering, primals, tangents):
     return jax.jvp(written_out, (lit,), tangents[:1])
 
 
-class _Mode(NamedTuple):
-    """Of one mode; its ground is None where modes but the first see a black one."""
-
-    order: Order
-    weight: Float[Array, "*batch"]
-    ground: Bordered | None
-    nodes: tuple[Array, Array]
-    beams: tuple[Array, Array]
-
-
-def _modes(lit: Lit) -> _Mode:
-    """What differs from mode to mode, on the first axis."""
-    dtype, num_modes = lit.weights.dtype, lit.weights.shape[0]
-    functions = node_functions(2 * _num_nodes(lit), num_modes)
-
-    def nodes(parity: int) -> Array:
-        rows = [functions[m, (m + parity) % 2 :: 2].T for m in range(num_modes)]
-        return jnp.asarray(np.stack(rows), dtype)
-
-    number = jnp.arange(num_modes, dtype=dtype)
-    order = Order(number % 2, (number == 0).astype(dtype))
-    grounds = lit.grounds
-    if grounds is not None:
-        grounds = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), lit.ground, grounds)
-    return _Mode(order, lit.weights, grounds, (nodes(0), nodes(1)), lit.beams)
-
-
-def _ground(lit: Lit, mode: _Mode) -> Bordered:
-    """Ground of a mode of which it is data whether it is the mean."""
-    if mode.ground is not None:
-        return mode.ground
-    is_mean = mode.order.mean > 0
-    return jax.tree.map(lambda x, y: jnp.where(is_mean, x, y), lit.ground, _nothing_below(lit))
-
-
-def _nothing_below(lit: Lit) -> Bordered:
-    return black(jnp.ones_like(lit.ground.diagonal), 2 * _num_nodes(lit))
-
-
-def _kernels(mode: _Mode) -> Kernels:
-    a, b = (mode_kernels(n, v) for n, v in zip(mode.nodes, mode.beams, strict=True))
-    return a, b
+def _every(lit: Lit) -> Mode:
+    return every_mode(lit.ground, lit.grounds, lit.weights, lit.beams, _num_nodes(lit))
 
 
 def _num_nodes(lit: Lit) -> int:

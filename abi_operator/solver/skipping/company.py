@@ -11,7 +11,8 @@ by the number of their groups and, among equals, by that of their modes,
 as if light scattered twice, of which there is S^2 s, lost the same share of itself from mode to
 mode until it counts less than the budget b times the reflectance R; s is the sum of the secants.
 Every other number of groups begins with the columns of most modes, so that a tile of two numbers
-has columns that are alike in their modes. The order only costs time where it is wrong.
+has columns that are alike in their modes. The order only costs time where it is wrong, and with few
+streams (`SORTED_FROM`) it costs more than it saves.
 """
 
 import jax
@@ -21,6 +22,9 @@ from jaxtyping import Array, Float
 from . import budget
 from .grouping import Alike, Limits, group_labels
 
+SORTED_FROM = 6
+"""Streams from which columns are put in order (``benchmarks/skipping.py --streams`` has rows with
+and without)."""
 _STRAIGHT = 1e-6  # product of the tangents of half the zenith angles, which is 0 for either at 0
 
 

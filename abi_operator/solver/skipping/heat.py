@@ -25,7 +25,6 @@ from ..method.mode_layers import read
 from ..method.quadrature import double_gauss
 from .budget import Expected
 from .grouping import Groups
-from .merging import summed
 
 _THIN = 1e-4  # below which a rounding error over x counts for more than a term of its series
 
@@ -40,14 +39,14 @@ class Warm(NamedTuple):
     sun
         Radiance of a reflectance of 1.
     planck
-        Planck function at the upper face of each layer.
+        Planck function at the levels.
     returned
         Share of isotropic light on the ground that it sends to the view, unscattered. [-]
     """
 
     known: Expected
     sun: Float[Array, "*batch"]
-    planck: Float[Array, "layer *batch"]
+    planck: Float[Array, "level *batch"]
     returned: Float[Array, "*batch"]
 
 
@@ -124,13 +123,6 @@ def _emissivities(x):
     return through, mean, ratio - through
 
 
-def grouped_jumps(
-    groups: Groups, jumps: Float[Array, "layer *batch"]
-) -> Float[Array, "layer *batch"]:
-    """Increase of the Planck function across each group."""
-    return summed(groups, jumps)
-
-
 def lost(
     warm: Warm,
     groups: Groups,
@@ -147,7 +139,7 @@ def lost(
         Optical depth, 1 - ssa and increase of the Planck function of layers, and of groups.
     """
     tau, coalbedo, jumps = members
-    apart = unscattered(tau, coalbedo, warm.planck, jumps, secant, num_streams)
+    apart = unscattered(tau, coalbedo, warm.planck[:-1], jumps, secant, num_streams)
     tau, coalbedo, jumps = solved
     above = warm.planck[:1]
     planck = jnp.concatenate([above, above + jnp.cumsum(jumps, axis=0)[:-1]])

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..method.doublings import Doublings, layer_doublings
-from ..method.mode_layers import read
+from ..method.mode_layers import Layers, read
 from . import budget
 from .budget import Expected
 from .grouping import Alike, Groups, Limits, grouped
@@ -38,6 +38,11 @@ class LayersOfModes(NamedTuple):
         single = jnp.stack([self.coalbedo, self.sun_secants], axis=1)
         return jnp.concatenate([single, *self.moments], axis=1)
 
+    def as_layers(self) -> Layers:
+        """The same as the modes read them, one by one."""
+        tau, coalbedo, sun_secants, moments = self
+        return Layers(tau, coalbedo, sun_secants, jnp.concatenate(moments))
+
     def of_rows(self, tau: Array, rows: Float[Array, "layer row *batch"]) -> "LayersOfModes":
         """Layers, or slopes in them, from a thickness and such an array."""
         end = 2 + self.moments[0].shape[1]
@@ -55,9 +60,9 @@ class Plan(eqx.Module):
         Of each group.
     given, groups
         The layers given, and which group each belongs to; None where each is solved by itself.
-    known, allowed
-        Of the light beside the modes', and the share of it that a mode may count for and yet be the
-        last one; None where all modes are solved.
+    known, error_budget
+        Of the light beside the modes', and the relative error of it that may be made; None where
+        all modes are solved.
     """
 
     layers: LayersOfModes
@@ -65,7 +70,7 @@ class Plan(eqx.Module):
     given: LayersOfModes
     groups: Groups | None
     known: Expected | None
-    allowed: float | None = eqx.field(static=True)
+    error_budget: float | None = eqx.field(static=True)
 
     @property
     def num_groups(self) -> Any:
@@ -85,17 +90,16 @@ class Plan(eqx.Module):
 
     def beyond_the_mean(self) -> Bool[Array, "batch"]:
         """Which columns need any mode but the mean, as far as is known before."""
-        assert self.known is not None and self.allowed is not None
-        share = budget.OF_NO_MODES / budget.OF_MODES * self.allowed
-        return self.known.aside > share * self.known.least
+        assert self.known is not None and self.error_budget is not None
+        return self.known.aside > budget.OF_NO_MODES * self.error_budget * self.known.least
 
     def wanting(
         self, total: Float[Array, "*view batch"], size: Float[Array, "batch"]
     ) -> Bool[Array, "batch"]:
         """Which columns need more modes after one of this size and such a sum of them."""
-        assert self.known is not None and self.allowed is not None
+        assert self.known is not None and self.error_budget is not None
         light = jnp.maximum(jnp.abs(total + self.known.added), self.known.dark)
-        return jnp.any(size > self.allowed * light, axis=0)
+        return jnp.any(size > budget.OF_MODES * self.error_budget * light, axis=0)
 
 
 def everything(layers: LayersOfModes, doublings: Doublings) -> Plan:
@@ -110,7 +114,7 @@ def planned(
     error_budget: float,
     most: int | None,
     thickest: float = float("inf"),
-    warm: tuple[Warm, Float[Array, "layer *batch"]] | None = None,
+    warm: Warm | None = None,
 ) -> Plan:
     """What an error budget asks for.
 
@@ -127,7 +131,7 @@ def planned(
     thickest
         Optical depth on the way down and up that no group exceeds. [-]
     warm
-        Of columns that emit, with the increase of the Planck function across each layer.
+        What is known of columns that emit.
     """
     given, groups = layers, None
     if layers.tau.shape[0] > 1:
@@ -136,9 +140,7 @@ def planned(
         forward = layers.moments[1][:, 0] / 3
         alike = Alike(layers.tau, 1 - layers.coalbedo, forward)
         if warm is not None:
-            heat, jumps = warm
-            levels = jnp.concatenate([heat.planck, heat.planck[-1:] + jumps[-1:]])
-            alike = alike._replace(planck=levels, sun=heat.sun)
+            alike = alike._replace(planck=warm.planck, sun=warm.sun)
         groups = grouped(alike, Limits(secant, allowed, thickest))
         tau, rows = merged(groups, layers.tau, layers.rows())
         layers = layers.of_rows(tau, rows)
@@ -147,8 +149,7 @@ def planned(
     num_streams = 2 * layers.moments[0].shape[1]
     share = budget.OF_DOUBLINGS if warm is None else budget.OF_DOUBLINGS_WARM
     doublings = layer_doublings(layers.tau, secants, num_streams, most, share * error_budget)
-    allowed_of_modes = budget.OF_MODES * error_budget
-    return Plan(layers, doublings, given, groups, known, allowed_of_modes)
+    return Plan(layers, doublings, given, groups, known, error_budget)
 
 
 def over_layers(
@@ -205,7 +206,7 @@ def over_modes(
         Whether all are solved, or until they are small.
     """
     num_modes = jax.tree.leaves(modes)[0].shape[0]
-    if plan.allowed is None:
+    if plan.error_budget is None:
         rest = jax.tree.map(lambda x: x[start:], modes)
         carry, found = jax.lax.scan(lambda c, mode: body(c, mode, 1.0)[:2], carry, rest)
         return carry, found
