@@ -85,5 +85,6 @@ def _warm(
         least=sun * known.least + thermal,
         dark=sun * known.dark,
         aside=sun * known.aside,
+        through=known.through,
     )
     return jax.lax.stop_gradient(Warm(of_light, sun, levels, albedo * seen))

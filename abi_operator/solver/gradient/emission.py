@@ -140,7 +140,9 @@ def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*b
     def plus(total, mode, counts):
         stack, _ = _stacked(lit, mode, mode.below(lit.ground, mean=False), None, *how)
         found = counts * mode.weight * top(stack).reflection()[0]
-        return total + found, None, (total + found)[None], jnp.abs(found)
+        total = total + found
+        share = None if plan.error_budget is None else plan.share(total[None], jnp.abs(found))
+        return total, None, share
 
     return over_modes(plus, mean, every, 1, None, plan)[0]
 

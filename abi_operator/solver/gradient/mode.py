@@ -35,7 +35,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced, matmul
+from ...machine.algebra import fenced, matmul, total
 from ...machine.kernels import one_kernel
 from ..method.adding import top
 from ..method.bordered import Bordered
@@ -53,14 +53,15 @@ Kernels = tuple[ModeKernels, ModeKernels]
 
 
 class Slopes(NamedTuple):
-    """Of one mode, in what its beams are made of and in its ground; of it and those before it, in
-    what all share.
+    """Of one mode, in what its beams are made of and in its ground, and the sum of the squares of
+    its own in the layers' moments; of it and those before it, in what all share.
     """
 
     shared: "Shared"
     even_beams: Float[Array, "2 degree *batch"]
     odd_beams: Float[Array, "2 degree *batch"]
     ground: Bordered
+    square: Float[Array, "*batch"]
 
 
 class Shared(NamedTuple):
@@ -124,16 +125,17 @@ def mode_slopes(
     given = _Given(layers, plan, order, kernels, view_secant)
     stack, room = _up(ground, room, given, keeper, single_scattering)
     reflection, fields = given.compiled(_fields_at_the_top, in_parts=True)(stack, weight)
-    start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
+    beams = (jnp.zeros_like(x.beams) for x in kernels)
+    start = *beams, slopes.view_secant, jnp.zeros_like(view_secant)
     carry = fields, start, slopes.layers, faces
     carry = _down(carry, room, given, keeper, single_scattering)
-    fields, (even, odd, view), layers, faces = carry
+    fields, (even, odd, view, square), layers, faces = carry
     if faces is not None:
         below = fields._replace(other=jnp.zeros_like(fields.other))
         last = slopes_at_face(below, ground, kernels, view_secant, single_scattering, order)
         faces = added_to(faces, plan.num_groups, last)
     shared = Shared(layers, view, faces)
-    return reflection, room, Slopes(shared, even, odd, pair(1.0, [fields]))
+    return reflection, room, Slopes(shared, even, odd, pair(1.0, [fields]), square)
 
 
 def _up(
@@ -208,4 +210,5 @@ def _collected(step, tau, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
     secants = h * (a.secants + b.secants)
     beams = totals[0] + h * a.beams, totals[1] + h * b.beams
     slopes = Layer(step * (a.h + b.h), h * coalbedo, secants[0], h * a.moments, h * b.moments)
-    return (*beams, totals[2] + secants[1]), slopes
+    square = totals[3] + total(slopes.even**2) + total(slopes.odd**2)
+    return (*beams, totals[2] + secants[1], square), slopes

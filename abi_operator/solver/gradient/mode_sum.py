@@ -149,7 +149,9 @@ def _reflectance(
     def another(total, mode, counts):
         found = reflection(False, mode)
         total = total + counts * mode.weight * found
-        return total, None, 0.5 * total, jnp.max(jnp.abs(found), axis=0)
+        if plan.error_budget is None:
+            return total, None, None
+        return total, None, plan.share(0.5 * total, jnp.max(jnp.abs(found), axis=0))
 
     # Without slopes a kernel for the mean alone is soon compiled, and a tenth faster than to ask in
     # each layer which mode it is.
@@ -214,10 +216,14 @@ def _reflectance_and_gradient(inputs, plan, how):
             of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, found.ground)
         own = None if inputs.grounds is None else found.ground
         value = value + weight * reflection
-        # The mean is never the last by chance.
-        size = jnp.where(mode.order.mean > 0, jnp.full_like(value, jnp.inf), jnp.abs(reflection))
         row = counts * reflection[None], (found.even_beams, found.odd_beams), own
-        return (value, found.shared, of_mean, room), row, 0.5 * value, size
+        carry = value, found.shared, of_mean, room
+        if plan.error_budget is None:
+            return carry, row, None
+        of_slopes = plan.share_of_slopes(found.square, found.shared.layers.tau)
+        share = jnp.maximum(of_slopes, plan.share(0.5 * value[None], jnp.abs(reflection)))
+        # The mean is never the last by chance.
+        return carry, row, jnp.where(mode.order.mean > 0, jnp.inf, share)
 
     nothing = jax.tree.map(jnp.zeros_like, (shared.view_secant, shared, inputs.ground))
     keep = layers.tau, num_nodes, doublings.most, faces is not None

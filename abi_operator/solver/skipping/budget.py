@@ -25,12 +25,15 @@ LEAST_BRF = 0.01
 OF_MERGING = 0.5
 """Share of the budget that a group of merged layers may be estimated to lose, and to misplace of
 thermal light that it scatters."""
-OF_MODES = 1.0
+OF_MODES = 0.5
 """Share of the budget below which an azimuth mode is the last one."""
 OF_DOUBLINGS = 0.2
 """Share of the budget that a layer's response may be off by."""
 OF_DOUBLINGS_WARM = 2e-4
 """The same of layers that emit, whose light may be that of a cold top over a hot ground."""
+OF_MODES_OF_SLOPES = 3e-4
+"""Share of a column's slopes below which those of an azimuth mode in the moments are the last. Such
+of a high degree are much the same in every mode, and many small ones add up to 1 %."""
 OF_NO_MODES = 0.1
 """Share of the budget below which all modes but the mean are expected to stay."""
 DECAY = 0.15
@@ -56,12 +59,16 @@ class Expected(NamedTuple):
         What a reflectance of `LEAST_BRF` is.
     aside
         A generous estimate of what any mode but the mean may add to it.
+    through
+        Share of the beam that meets nothing on its way to the ground and back: at least the slope
+        in the albedo of a Lambertian ground. [-]
     """
 
     added: Float[Array, "view *batch"]
     least: Float[Array, "*batch"]
     dark: Float[Array, "*batch"]
     aside: Float[Array, "*batch"]
+    through: Float[Array, "*batch"]
 
 
 def expected(
@@ -104,5 +111,6 @@ def expected(
     least = jnp.maximum(LEAST_BRF, jnp.min(seen, axis=0) + diffused)
     twice = (scattered / (1 + scattered)) ** 2 / (cosines[0] * jnp.min(cosines[1:], axis=0))
     aside = jnp.full_like(twice, jnp.inf) if ground is None else twice
-    known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside)
+    through = jnp.exp(-(1 / cosines[0] + 1 / cosines[1]) * jnp.sum(tau, axis=0))
+    known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside, through)
     return jax.lax.stop_gradient(known)

@@ -93,13 +93,22 @@ class Plan(eqx.Module):
         assert self.known is not None and self.error_budget is not None
         return self.known.aside > budget.OF_NO_MODES * self.error_budget * self.known.least
 
-    def wanting(
-        self, total: Float[Array, "*view batch"], size: Float[Array, "batch"]
-    ) -> Bool[Array, "batch"]:
-        """Which columns need more modes after one of this size and such a sum of them."""
+    def share(
+        self, light: Float[Array, "*view batch"], size: Float[Array, "batch"]
+    ) -> Float[Array, "batch"]:
+        """How much of what it may be a mode's part of the light is, from the light of the modes so
+        far."""
         assert self.known is not None and self.error_budget is not None
-        light = jnp.maximum(jnp.abs(total + self.known.added), self.known.dark)
-        return jnp.any(size > budget.OF_MODES * self.error_budget * light, axis=0)
+        light = jnp.maximum(jnp.abs(light + self.known.added), self.known.dark)
+        return jnp.max(size / (budget.OF_MODES * self.error_budget * light), axis=0)
+
+    def share_of_slopes(
+        self, square: Float[Array, "batch"], tau_slopes: Float[Array, "layer batch"]
+    ) -> Float[Array, "batch"]:
+        """The same of its slopes in moments, from the sum of their squares and slopes in tau."""
+        assert self.known is not None
+        norm = jnp.sum(tau_slopes**2, axis=0) + self.known.through**2
+        return jnp.sqrt(square / norm) / budget.OF_MODES_OF_SLOPES
 
 
 def everything(layers: LayersOfModes, doublings: Doublings) -> Plan:
@@ -176,14 +185,14 @@ def over_layers(
 
 
 def over_modes(
-    body: Callable[[Any, Any, Any], tuple[Any, Any, Any, Any]],
+    body: Callable[[Any, Any, Any], tuple[Any, Any, Any]],
     carry: Any,
     modes: Any,
     start: int,
     rows: Any,
     plan: Plan,
 ) -> tuple[Any, Any]:
-    """``carry, row, total, size = body(carry, mode, counts)`` for the modes that count.
+    """``carry, row, share = body(carry, mode, counts)`` for the modes that count.
 
     Where the mean is one of them it is the first, and counts. A tile ends with the last column that
     needs a mode. In the others it counts for nothing: what a column gets does not depend on those
@@ -192,8 +201,8 @@ def over_modes(
     Parameters
     ----------
     body
-        Of one mode; gives its row of the results, the light of the modes so far, and how large a
-        part of it this mode may be at any azimuth. `counts` is 1 in columns that need it, else 0.
+        Of one mode; gives its row of the results, and how much of what it may be to be the last one
+        its part of them is. `counts` is 1 in columns that need it, else 0.
     carry
         What goes from mode to mode.
     modes
@@ -222,12 +231,12 @@ def over_modes(
     def one(state):
         m, carry, rows, before, counts = state
         mode = jax.tree.map(lambda x: read(x, m), modes)
-        carry, row, total, size = body(carry, mode, counts)
+        carry, row, share = body(carry, mode, counts)
         rows = jax.tree.map(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
-        wanting = plan.wanting(total, jnp.maximum(size, budget.DECAY * before))
-        return m + 1, carry, rows, size, jnp.where(wanting & beyond, counts, 0)
+        wanting = jnp.maximum(share, budget.DECAY * before) > 1
+        return m + 1, carry, rows, share, jnp.where(wanting & beyond, counts, 0)
 
     rows = jax.tree.map(jnp.zeros_like, rows)
     _, carry, rows, _, _ = jax.lax.while_loop(

@@ -28,7 +28,7 @@ def test_chunks_cover_all_columns_and_few_twice(num_cores):
 
 
 def test_cores_share_the_columns_evenly():
-    for size in (1000, 2048, 5000, 100_000):
+    for size in (WIDTHS[-1], 1000, 2048, 5000, 100_000):
         # Each takes the next chunk as soon as it is done.
         busy = np.zeros(2)
         for _, width in cut(size, WIDTHS, 2):

@@ -100,6 +100,26 @@ def test_slopes_of_members_are_their_own(error_budget):
     assert np.quantile(wrong / np.linalg.norm(flat(exact), axis=1), 0.99) < 0.01
 
 
+@pytest.mark.slow
+def test_slopes_in_moments_of_high_degree():
+    """They are much the same in every mode: with many streams most modes count for them, although
+    they count for nothing in the reflectance."""
+    given, num_streams = dict(columns()), 12
+    given["moments"] = given["moments"][..., : num_streams + 1]
+
+    def found(error_budget):
+        def total(arguments):
+            how = {"num_streams": num_streams, "error_budget": error_budget}
+            return jnp.sum(toa_brf(**arguments, **how))
+
+        slopes = jax.grad(total)(given)
+        return np.concatenate([np.asarray(x).reshape(96, -1) for x in slopes.values()], axis=1)
+
+    whole = found(None)
+    wrong = np.linalg.norm(found(1e-3) - whole, axis=1) / np.linalg.norm(whole, axis=1)
+    assert np.quantile(wrong, 0.99) < 0.01
+
+
 def test_the_same_inside_of_everything():
     """Under `jax.jit`, mapped one by one and with the others in another order: what is left out for
     a column hardly depends on any other."""
