@@ -6,8 +6,8 @@ Three Datasets follow each other, and each is described by names of this table:
   *top first* (layer 0 is the uppermost), dimensions ``time layer y x`` (``level`` for edges);
 - the **scenario**: one time of a scene (``layer y x``), completed to the top of the atmosphere,
   with clouds as paths, surface albedo by band, angles in degrees, the plumes that were specified,
-  and where they are to be simulated gases, other hydrometeors and temperatures (`OPTIONAL`). It is
-  the truth, and everything that the operator reads;
+  and where they are to be simulated gases, other hydrometeors, temperatures (`OPTIONAL`) and fires
+  (`FIRE`). It is the truth, and everything that the operator reads;
 - the **result**: the scenario, the radiances and reflectances simulated from it and the optical
   depths they contain. A retrieval reads it back.
 
@@ -146,6 +146,22 @@ OPTIONAL: dict[str, Variable] = {
 """What a scenario has where gases or emission are simulated. Of hydrometeors other than cloud water
 it has ``{class}_mass_path`` and ``{class}_number_path`` (layer, y, x)."""
 
+FIRE: dict[str, Variable] = {
+    "fire_fraction": Variable(HORIZONTAL, "1", "share of the ground that burns"),
+    "fire_temperature": Variable(HORIZONTAL, "K", "temperature of the flames"),
+}
+"""What a scenario has where there are fires; where nothing burns the temperature is NaN."""
+
+FIRE_TABLE: dict[str, Variable] = {
+    "latitude": Variable(("fire",), "degrees_north", "latitude", "latitude"),
+    "longitude": Variable(("fire",), "degrees_east", "longitude", "longitude"),
+    "temperature": Variable(("fire",), "K", "temperature of the flames"),
+    "area": Variable(("fire",), "m2", "ground that burns"),
+    "start": Variable(("fire",), "", "time from which on it burns, UTC"),
+    "end": Variable(("fire",), "", "time at which it burns no more, UTC"),
+}
+"""A table of fires, as a file has it."""
+
 PLUME: dict[str, Variable] = {
     "brightness": Variable(HORIZONTAL, "1", "horizontal weight of the plume, 0 to 1"),
     "base": Variable((), "m", "lower edge of the plume above the ground"),
@@ -209,7 +225,7 @@ LARGEST_SHARE_OUTSIDE = 0.1
 
 def variable(name: str) -> Variable | None:
     """Look a Dataset variable up by name; None where the project does not define it."""
-    for table in (RESULT, SCENARIO, OPTIONAL, OPTIONAL_RESULT, MODEL, BY_BAND):
+    for table in (RESULT, SCENARIO, OPTIONAL, FIRE, OPTIONAL_RESULT, MODEL, BY_BAND):
         if name in table:
             return table[name]
     owner, _, quantity = name.partition("_")

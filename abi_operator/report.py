@@ -69,6 +69,12 @@ def account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
     for name, words in _COVERS.items():
         if name in account:
             yield f"{words}: {account[name]} columns"
+    if "fire_count" in account:
+        shared = account["fires_joined_count"]
+        joined = f"; {shared} share a column with others" if shared else ""
+        yield (
+            f"fires: {account['fire_count']} in {account['burning_columns_count']} columns{joined}"
+        )
     if account["unsimulated_condensate_share"]:
         share = 100 * float(account["unsimulated_condensate_share"])
         kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")

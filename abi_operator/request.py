@@ -40,6 +40,8 @@ class Request(NamedTuple):
         Of the ground in C07, as `scene.scenario` takes it.
     land_albedo, sea_ice_albedo, snow_albedo
         As `scene.scenario` takes them. [-]
+    fires
+        Table of fires, as `files.read_fires` takes it.
     gases, hydrometeors, microphysics, droplet_number, cloud_optics, ice_optics, flat_sun
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
     satellite, satellite_longitude
@@ -63,6 +65,7 @@ class Request(NamedTuple):
     plume: Path | None = None
     plume_species: Species = Species.SMOKE
     plume_aod: float = 2.0
+    fires: Path | None = None
     bands: tuple[str, ...] = GRASSO2013
     broadband: bool = False
     emissivity: Emissivity | None = None

@@ -113,6 +113,14 @@ def simulate(
     plume_aod: Annotated[
         float, typer.Option(min=0, help="Optical depth of the plume at 550 nm where it is white.")
     ] = 2.0,
+    fires: Annotated[
+        Path | None,
+        typer.Option(
+            help="Let fires burn: a table (CSV) with latitude, longitude, temperature [K] and area "
+            "[m2] of each, and start and end (UTC) if it does not burn all the time. They shine in "
+            "C05, C06 and C07."
+        ),
+    ] = None,
     gases: Annotated[
         str, typer.Option(help=f"Gases that absorb: all, none, or some of {', '.join(ALL_GASES)}.")
     ] = _ALL,
@@ -243,6 +251,7 @@ def simulate(
         plume=plume,
         plume_species=plume_species,
         plume_aod=plume_aod,
+        fires=fires,
         gases=_names(gases, ALL_GASES),
         hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
         microphysics=microphysics,

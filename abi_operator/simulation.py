@@ -20,6 +20,7 @@ from .files import (
     noted_files,
     open_wrf_series,
     projected,
+    read_fires,
     read_mcd43a1,
     read_plume,
     read_result,
@@ -38,6 +39,7 @@ from .scene import (
     check_classes,
     check_cloud_optics,
     check_emissivity,
+    check_fires,
     check_gases,
     check_ground,
     check_ice_albedo,
@@ -47,6 +49,7 @@ from .scene import (
     check_sight,
     classes_present,
     completion_heights,
+    fires_inside,
     highest_top,
     nearest_standard_atmosphere,
     row_blocks,
@@ -71,7 +74,7 @@ class Scene(NamedTuple):
         As `files.open_wrf_series` returns.
     coordinates
         As `files.wrf_coordinates` returns, of all times and the place of the first one simulated.
-    albedo, plumes
+    albedo, plumes, fires
         What was read.
     chosen_times
         Indices of the times to simulate. [-]
@@ -88,6 +91,7 @@ class Scene(NamedTuple):
     coordinates: xr.Dataset
     albedo: xr.Dataset | None
     plumes: dict[str, PlumeSpecification]
+    fires: xr.Dataset | None
     chosen_times: tuple[int, ...]
     added_heights: tuple[float, ...]
     hydrometeors: tuple[str, ...]
@@ -128,6 +132,8 @@ def open_scene(request: Request) -> Scene:
     albedo = None
     if request.albedo is not None and solar:
         albedo = read_mcd43a1(request.albedo, solar, broadband=request.broadband)
+    fires = None if request.fires is None else read_fires(request.fires)
+    inside = None
     tops, present = [], set()
     for time in times:
         place = series.coordinates(time)
@@ -140,6 +146,9 @@ def open_scene(request: Request) -> Scene:
             request.emissivity,
             request.land_albedo,
         )
+        if fires is not None:
+            found = fires_inside(fires, place)
+            inside = found if inside is None else inside | found
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
             model = series.read(time, rows)
             check_land_albedo(request.land_albedo, model)
@@ -149,12 +158,15 @@ def open_scene(request: Request) -> Scene:
                 request.droplet_number.over(model)
             tops.append(highest_top(model))
             present.update(classes_present(model, request.microphysics))
+    if inside is not None:
+        check_fires(inside, request.bands)
     return Scene(
         request,
         series,
         coordinates,
         albedo,
         plumes,
+        fires,
         times,
         completion_heights(max(tops)),
         tuple(x for x in CLASSES if x in present)
@@ -185,6 +197,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         snow_albedo=request.snow_albedo,
         emissivity=request.emissivity,
         plumes=scene.plumes,
+        fires=scene.fires,
         satellite=request.satellite,
         satellite_longitude=request.satellite_longitude,
         bands=request.bands,
@@ -230,7 +243,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         )
         wrf = dict.fromkeys(scene.series.places[time][0].name for time in scene.chosen_times)
         account["wrf_file"] = "; ".join(wrf)
-        files = {"albedo": request.albedo, "plume": request.plume}
+        files = {"albedo": request.albedo, "plume": request.plume, "fires": request.fires}
         account |= {f"{kind}_file": path.name for kind, path in files.items() if path is not None}
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:

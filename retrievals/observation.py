@@ -20,6 +20,7 @@ from abi_operator.instrument import (
     reflectance_factor_from_radiance,
 )
 from abi_operator.nomenclature import QUALITY_FLAGS
+from abi_operator.radiance import FIRE_BANDS
 
 from .forward import THERMAL, ForwardModel
 from .results import ResultCode
@@ -193,11 +194,18 @@ def add_noise(reflectance_factor: xr.DataArray, seed: int, imager: Imager = IMAG
 
 
 def observe(columns: xr.Dataset, bands: tuple[str, ...], imager: Imager = IMAGER) -> Observation:
-    """Take the measurement vectors of a Dataset with a dimension ``column``."""
+    """Take the measurement vectors of a Dataset with a dimension ``column``.
+
+    Bands in which a fire of the scenario shines are missing: it is not part of the forward models
+    of reflectances.
+    """
     measured = columns["reflectance_factor"].sel(band=list(bands))
     if THERMAL in bands:
         thermal = columns["radiance"].sel(band=list(bands))
         measured = measured.where(measured["band"] != THERMAL, thermal)
+    if "fire_fraction" in columns:
+        shines = measured["band"].isin(FIRE_BANDS) & (columns["fire_fraction"] > 0)
+        measured = measured.where(~shines)
     values = measured.transpose("column", "band").values.astype(np.float64)
     return measurement(values, bands, imager)
 

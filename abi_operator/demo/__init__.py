@@ -2,7 +2,8 @@
 
 `write_demo` draws a coast like southern California's in a Santa Ana wind, with stratocumulus at
 sea and the smoke of three fires, and writes what a user would bring: the output of a weather
-model, MODIS albedo and a picture of the smoke, in the layouts of WRF, of AppEEARS and of PNG.
+model, MODIS albedo, a picture of the smoke and a table of the fires, in the layouts of WRF, of
+AppEEARS, of PNG and of CSV.
 """
 
 from .write import DemoInputs as DemoInputs

@@ -1,5 +1,7 @@
 """Smoke of three fires, blown over the sea, as the grey values of a picture."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .grid import Grid
@@ -18,12 +20,32 @@ _WIDTH = 2.2e3
 _SPREAD = 0.10
 
 
-def plume_brightness(rng: np.random.Generator, grid: Grid) -> np.ndarray:
-    """Brightness (y, x) of the smoke, 0 to 1 and 0 outside it. [-]"""
+class Smoke(NamedTuple):
+    """Smoke and its sources.
+
+    Parameters
+    ----------
+    brightness
+        Of the picture (y, x), 0 to 1 and 0 outside the smoke. [-]
+    east, north
+        Of the fires. [m]
+    strength
+        Of the fires, relative to the strongest. [-]
+    """
+
+    brightness: np.ndarray
+    east: np.ndarray
+    north: np.ndarray
+    strength: np.ndarray
+
+
+def make_smoke(rng: np.random.Generator, grid: Grid) -> Smoke:
+    """Smoke of fires near the coast, a little elsewhere for every seed."""
     inland, along = coast_axes(grid.east, grid.north)
-    smoke = np.zeros_like(inland)
+    smoke, places = np.zeros_like(inland), []
     for fire_inland, fire_along, strength in _FIRES:
         shift = rng.uniform(-6e3, 6e3, size=2)
+        places.append((fire_inland + shift[0], fire_along + shift[1]))
         heading = _HEADING + rng.uniform(-0.07, 0.07)
         ahead, aside = inland - fire_inland - shift[0], along - fire_along - shift[1]
         downwind = np.cos(heading) * ahead + np.sin(heading) * aside
@@ -31,7 +53,10 @@ def plume_brightness(rng: np.random.Generator, grid: Grid) -> np.ndarray:
         smoke += strength * _plume(rng, downwind, crosswind, grid.spacing)
     clear = np.quantile(smoke, 1 - _COVER)
     dense = np.quantile(smoke, 0.998)
-    return np.clip((smoke - clear) / (dense - clear), 0, 1) ** 0.7
+    brightness = np.clip((smoke - clear) / (dense - clear), 0, 1) ** 0.7
+    # Turned once more, the axes along the coast are those of the map again.
+    east, north = coast_axes(*np.transpose(places))
+    return Smoke(brightness, east, north, np.array([strength for *_, strength in _FIRES]))
 
 
 def _plume(

@@ -10,22 +10,26 @@ from PIL import Image
 from .air import make_air, with_hydrostatic_height
 from .albedo_file import write_albedo
 from .clouds import cloud_mixing_ratio, make_clouds, make_weather, saturate
+from .fire_table import write_fires
 from .grid import make_grid
 from .landscape import make_landscape
-from .plume_picture import plume_brightness
+from .plume_picture import make_smoke
 from .wrf_file import FILE_NAME, write_wrf
 
 
 class DemoInputs(NamedTuple):
-    """The files of a demonstration: model output, MODIS albedo and a picture of the smoke."""
+    """The files of a demonstration: model output, MODIS albedo, a picture of the smoke and a table
+    of the fires that it comes from.
+    """
 
     wrf: Path
     albedo: Path
     plume: Path
+    fires: Path
 
 
 def write_demo(folder: str | PathLike[str], *, size: int = 64, seed: int = 0) -> DemoInputs:
-    """Write model output, albedo and a plume picture of a smoky Californian coast.
+    """Write model output, albedo, a plume picture and fires of a smoky Californian coast.
 
     The scene is 256 km wide around 33.5 N 117.5 W, on 23 October 2007 at 18 UTC.
 
@@ -42,7 +46,8 @@ def write_demo(folder: str | PathLike[str], *, size: int = 64, seed: int = 0) ->
         raise ValueError(f"a demonstration has 8 rows and columns or more; got {size=}.")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    paths = DemoInputs(folder / FILE_NAME, folder / "albedo.nc", folder / "plume.png")
+    names = FILE_NAME, "albedo.nc", "plume.png", "fires.csv"
+    paths = DemoInputs(*(folder / name for name in names))
     land_rng, cloud_rng, smoke_rng = np.random.default_rng(seed).spawn(3)
     landscape = make_landscape(land_rng)
     grid = make_grid(size)
@@ -55,7 +60,8 @@ def write_demo(folder: str | PathLike[str], *, size: int = 64, seed: int = 0) ->
     air = with_hydrostatic_height(saturate(clear, cloud_water), terrain, cloud_water)
     write_wrf(paths.wrf, grid, air, cloud_water, terrain, distance > 0)
     write_albedo(paths.albedo, landscape, grid.spacing)
-    brightness = plume_brightness(smoke_rng, grid)
-    picture = np.flipud(np.rint(255 * brightness).astype(np.uint8))
+    smoke = make_smoke(smoke_rng, grid)
+    picture = np.flipud(np.rint(255 * smoke.brightness).astype(np.uint8))
     Image.fromarray(picture).save(paths.plume)
+    write_fires(paths.fires, smoke)
     return paths

@@ -24,6 +24,8 @@ from .droplet_number import DropletNumber as DropletNumber
 from .emissivity import BY_LAND_USE as BY_LAND_USE
 from .emissivity import Emissivity as Emissivity
 from .emissivity import check_emissivity as check_emissivity
+from .fires import check_fires as check_fires
+from .fires import fires_inside as fires_inside
 from .gases import check_gases as check_gases
 from .gases import gases_of as gases_of
 from .hydrometeors import check_microphysics as check_microphysics

@@ -24,6 +24,7 @@ _OF_GASES = "vapour", "ozone", "carbon_dioxide", "methane", "nitrous_oxide"
 # What a scenario may have.
 _OPTIONAL = {name: WEATHER[name] for name in ("temperature", "surface_temperature")}
 _OPTIONAL |= {name: STATE[name] for name in _OF_GASES}
+_OPTIONAL["fire_fraction"] = STATE["fraction"]
 
 
 class Requirement(NamedTuple):
@@ -78,6 +79,9 @@ def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
     for name, allowed in _OPTIONAL.items():
         if name in scenario:
             yield _inside(name, scenario[name].values, allowed)
+    if "fire_fraction" in scenario:
+        hot = _inside("fire_temperature", scenario["fire_temperature"].values, STATE["temperature"])
+        yield hot._replace(holds=hot.holds | (scenario["fire_fraction"].values == 0))
     albedo = _inside("surface_albedo", scenario["surface_albedo"].values, STATE["albedo"])
     missing = (scenario["quality_flag"].values & QUALITY_FLAGS["no_albedo"]) > 0
     yield albedo._replace(holds=albedo.holds | missing)

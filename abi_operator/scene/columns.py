@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..atmosphere import Atmosphere, Gases, Hydrometeor, LiquidCloud, MiePlume, Plume, State
+from ..atmosphere import Atmosphere, Fire, Gases, Hydrometeor, LiquidCloud, MiePlume, Plume, State
 from ..bands import GRASSO2013, check_bands
 from ..geometry import Geometry
 from ..nomenclature import PLUME
@@ -16,6 +16,7 @@ from .sun import spherical_somewhere
 
 _GASES = ("vapour", "ozone")
 _MOLE_FRACTIONS = ("carbon_dioxide", "methane", "nitrous_oxide")
+_NO_FIRE = 300.0  # [K]
 
 
 def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> State:
@@ -33,9 +34,9 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     -------
     State
         NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
-        faster. Gases, temperatures and hydrometeors are those that the scenario has, and clouds
-        scatter as its attributes say (`cloud_optics_of`, `ice_optics_of`), through which a low sun,
-        where there is one, shines likewise (`spherical_somewhere`).
+        faster. Gases, temperatures, hydrometeors and fires are those that the scenario has, and
+        clouds scatter as its attributes say (`cloud_optics_of`, `ice_optics_of`), through which a
+        low sun, where there is one, shines likewise (`spherical_somewhere`).
     """
     bands = check_bands(bands, [str(band) for band in scenario["band"].values])
     reader = _Reader(scenario)
@@ -81,6 +82,7 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
         surface_albedo,
         Geometry(**angles, spherical=spherical_somewhere(scenario, angles["solar_zenith"])),
         surface_temperature=reader.optional("surface_temperature"),
+        fire=_fire(reader) if "fire_fraction" in scenario else None,
     )
 
 
@@ -118,6 +120,12 @@ class _Reader:
     def by_band(self, name: str, bands: tuple[str, ...]) -> dict[str, Any]:
         """A variable in each band, (column,)."""
         return {band: self.values(name, band=band) for band in bands}
+
+
+def _fire(reader: _Reader) -> Fire:
+    fraction, hot = (reader.values(f"fire_{name}") for name in ("fraction", "temperature"))
+    # Of a fire that is none nothing is seen, but a number has to be there.
+    return Fire(fraction, np.where(fraction > 0, hot, _NO_FIRE))
 
 
 def _plume(reader: _Reader, species: str, bands: tuple[str, ...]) -> Plume:

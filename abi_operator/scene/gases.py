@@ -1,5 +1,7 @@
 """Temperature and absorbing gases of a model's columns, completed to the top of the atmosphere."""
 
+import warnings
+
 import numpy as np
 import xarray as xr
 
@@ -104,3 +106,45 @@ def gas_amounts(
         "methane": np.asarray(standard.methane),
         "nitrous_oxide": np.asarray(standard.nitrous_oxide),
     }
+
+
+def air_fields(
+    model: xr.Dataset,
+    height: np.ndarray,
+    standard: StandardProfile,
+    gases: tuple[str, ...],
+    *,
+    emits: bool,
+) -> tuple[dict[str, np.ndarray], dict[str, str | int | float]]:
+    """What only gases and emission need of the air and the ground, and what was assumed of it.
+
+    Parameters
+    ----------
+    model, height, standard
+        A model Dataset, heights of the completed levels (level, y, x) [m], and the profile that
+        completes it.
+    gases
+        Gases that absorb.
+    emits
+        Whether something shines in the bands that are simulated.
+    """
+    fields: dict[str, np.ndarray] = {}
+    attributes: dict[str, str | int | float] = {}
+    if gases:
+        fields |= gas_amounts(model, height, standard)
+    if gases or emits:
+        fields["temperature"] = level_temperature(model, height, standard)
+        attributes["standard_atmosphere"] = standard.name
+    if emits and "surface_temperature" in model:
+        fields["surface_temperature"] = model["surface_temperature"].values
+        attributes["surface_temperature_source"] = "the model's"
+    elif emits:
+        fields["surface_temperature"] = fields["temperature"][-1]
+        attributes["surface_temperature_source"] = "that of the air at the ground"
+        warnings.warn(
+            "the model has no temperature of the ground (TSK in WRF's files); it is taken to be "
+            "that of the air.",
+            UserWarning,
+            stacklevel=3,
+        )
+    return fields, attributes

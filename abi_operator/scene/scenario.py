@@ -12,7 +12,7 @@ from ..files import InputError
 from ..files.netcdf import cf_attributes
 from ..nomenclature import QUALITY_FLAGS, variable
 from ..optics import ALL_GASES
-from ..radiance import THERMAL
+from ..radiance import FIRE_BANDS, THERMAL
 from ..satellites import SATELLITES, gas_fit_covers
 from .account import (
     condensate_account,
@@ -28,12 +28,13 @@ from .cloud_optics import check_cloud_optics, check_ice_optics, optics_attribute
 from .column_air import complete_air, completion_heights, highest_top
 from .droplet_number import DropletNumber
 from .emissivity import Emissivity
-from .gases import check_gases, gas_amounts, gases_attribute, level_temperature
+from .fires import burning_columns
+from .gases import air_fields, check_gases, gases_attribute
 from .hydrometeors import Hydrometeors, hydrometeor_paths
 from .land import LandAlbedo
 from .snow_and_ice import IceAlbedo
 from .species import PlumeSpecification, plume_variables
-from .standard_profile import StandardProfile, nearest_standard_atmosphere, standard_profile
+from .standard_profile import nearest_standard_atmosphere, standard_profile
 
 
 def scenario(
@@ -58,14 +59,16 @@ def scenario(
     flat_sun: bool = False,
     standard_atmosphere: str | None = None,
     added_heights: Sequence[float] | None = None,
+    fires: xr.Dataset | None = None,
     rows: slice = slice(None),
 ) -> xr.Dataset:
     """Specify a scene, or a block of its rows, from a model's output.
 
     The columns are completed to the top of the atmosphere (`complete_air`), condensate becomes
     paths (`hydrometeor_paths`), the ground gets its albedo (`surface_albedo`), sun and satellite
-    their places (`find_angles`), and the plumes are added; where gases absorb or C07 is asked for,
-    so are gases (`gas_amounts`) and temperatures (`level_temperature`). Condensate that is not
+    their places (`find_angles`), and plumes and fires are added (`burning_columns`); where gases
+    absorb or something shines, so are gases (`gas_amounts`) and temperatures
+    (`level_temperature`). Condensate that is not
     simulated is warned of.
 
     Parameters
@@ -118,6 +121,9 @@ def scenario(
     added_heights
         Heights of levels to add above the model's top; None for `completion_heights` of this block.
         The blocks of a scene need the same. [m]
+    fires
+        Fires of the whole scene, as `files.read_fires` returns them; None if there is none. The
+        blocks of a scene need the same.
     rows
         The rows of the scene that `model` holds.
 
@@ -125,16 +131,16 @@ def scenario(
     -------
     xarray.Dataset
         Variables of `nomenclature.SCENARIO` and of the plumes and, where they are simulated, of
-        `nomenclature.OPTIONAL` and of the hydrometeors; coordinates ``band``,
-        ``band_wavelength`` and ``time``.
+        `nomenclature.OPTIONAL`, of `nomenclature.FIRE` and of the hydrometeors; coordinates
+        ``band``, ``band_wavelength`` and ``time``.
         Attributes account for what was assumed, completed and left out (`add_accounts`).
 
     Raises
     ------
     InputError
         Where albedo or emissivity is missing or does not cover the scene, a number of particles
-        cannot be assumed, the gases of a band are not known of the satellite, optics of
-        clouds have no such name, or a value is out of its range.
+        cannot be assumed, more burns than a column has ground, the gases of a band are not known of
+        the satellite, optics of clouds have no such name, or a value is out of its range.
     """
     bands, gases = check_bands(bands), check_gases(tuple(gases))
     check_cloud_optics(cloud_optics)
@@ -168,7 +174,12 @@ def scenario(
     standard = standard_profile(
         standard_atmosphere or nearest_standard_atmosphere(position["latitude"], time)
     )
-    air_fields, air_attributes = _air(model, height, standard, bands, gases)
+    emits = bool(set(bands) & set(THERMAL if fires is None else FIRE_BANDS))
+    of_air, assumed = air_fields(model, height, standard, gases, emits=emits)
+    if fires is not None:
+        burning = burning_columns(model, fires, first_row=rows.start or 0)
+        of_air |= {"fire_fraction": burning.fraction, "fire_temperature": burning.temperature}
+        assumed |= burning.attributes
     fields = {
         "pressure": pressure,
         "height": height,
@@ -178,7 +189,7 @@ def scenario(
         "relative_azimuth_angle": angles.relative_azimuth,
         "quality_flag": angle_flags(angles) | no_albedo,
     }
-    fields |= air_fields | _paths(condensate, len(added_heights))
+    fields |= of_air | _paths(condensate, len(added_heights))
     wavelengths = [BANDS[band].wavelength_um for band in bands]
     dataset = xr.Dataset(
         {name: (_dims(name), field, cf_attributes(name)) for name, field in fields.items()},
@@ -209,7 +220,7 @@ def scenario(
     return dataset.assign_attrs(
         model_attributes(model)
         | attributes
-        | air_attributes
+        | assumed
         | ground_sources
         | pressure_range(top_pressure)
         | condensate_account(condensate)
@@ -227,36 +238,6 @@ def check_absorption(satellite: str, bands: Sequence[str], gases: Sequence[str])
                 f"the absorption by gases in {band} is not known of {satellite}; simulate without "
                 "gases, without this band, or of another satellite."
             )
-
-
-def _air(
-    model: xr.Dataset,
-    height: np.ndarray,
-    standard: StandardProfile,
-    bands: tuple[str, ...],
-    gases: tuple[str, ...],
-) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """What only gases and emission need of the air and the ground, and what was assumed of it."""
-    fields, attributes = {}, {}
-    emits = bool(set(bands) & set(THERMAL))
-    if gases:
-        fields |= gas_amounts(model, height, standard)
-    if gases or emits:
-        fields["temperature"] = level_temperature(model, height, standard)
-        attributes["standard_atmosphere"] = standard.name
-    if emits and "surface_temperature" in model:
-        fields["surface_temperature"] = model["surface_temperature"].values
-        attributes["surface_temperature_source"] = "the model's"
-    elif emits:
-        fields["surface_temperature"] = fields["temperature"][-1]
-        attributes["surface_temperature_source"] = "that of the air at the ground"
-        warnings.warn(
-            "the model has no temperature of the ground (TSK in WRF's files); it is taken to be "
-            "that of the air.",
-            UserWarning,
-            stacklevel=3,
-        )
-    return fields, attributes
 
 
 def _paths(condensate: Hydrometeors, num_added: int) -> dict[str, np.ndarray]:

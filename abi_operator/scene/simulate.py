@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,26 +16,19 @@ from ..files.netcdf import cf_attributes
 from ..machine.chunks import map_chunks
 from ..machine.listening import Listener, listening
 from ..machine.sizes import chunks_to_read
-from ..nomenclature import QUALITY_FLAGS, variable
+from ..nomenclature import variable
 from ..optics import aerosol, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
-from ..planck import brightness_temperature
 from ..quality import flags_from
-from ..radiance import THERMAL, radiance
-from ..reflectance import brf
-from ..satellites import solar_irradiance
 from .angles import sun_distance
 from .cloud_optics import cloud_optics_of, ice_optics_of, optics_attributes
 from .columns import column_states, horizontal
 from .gases import check_gases, gases_attribute, gases_of
+from .light import Unheard, light
 from .sun import sun_path_of
 
 ERROR_BUDGET = 1e-3
 """Relative error of the reflectance of scenes that is spent on speed, unless another is asked for:
 a third of the instrument's noise over a white ground, and less of it over darker ones. [-]"""
-
-# Pixels with one of these flags are not solved; those of a night shine in C07.
-_UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
-_UNSOLVED = _UNSEEN | QUALITY_FLAGS["night"]
 
 
 def simulate(
@@ -49,9 +42,10 @@ def simulate(
 ) -> xr.Dataset:
     r"""Simulate the radiances and reflectances of a scenario.
 
-    In C07 sunlight and emission are one radiance. In the other bands radiance follows from the
-    reflectance factor, :math:`L = \rho E_0 / (\pi d^2)`, with the solar irradiance of the
-    scenario's satellite and the distance of the sun at its time (1 AU where it has none). Clouds
+    In C07 sunlight and emission are one radiance, and so they are in C05 and C06 where it burns
+    (`light`). Elsewhere radiance follows from the reflectance factor,
+    :math:`L = \rho E_0 / (\pi d^2)`, with the solar irradiance of the scenario's satellite and the
+    distance of the sun at its time (1 AU where it has none). Clouds
     scatter, and a low sun shines through layers, as the scenario says (`cloud_optics_of`,
     `ice_optics_of`, `sun_path_of`).
 
@@ -78,7 +72,7 @@ def simulate(
         depth at sizes for which optics were not fitted, by which pixels are flagged
         ``outside_fit``. C07 has no reflectance factor and no brf, which are NaN. By night the
         reflectance factor is 0 and brf NaN; without albedo, and out of the satellite's sight, all
-        is NaN.
+        is NaN. The reflectance factor of a fire is that of its radiance, by night too.
 
     Raises
     ------
@@ -92,24 +86,14 @@ def simulate(
     if gases and "vapour" not in scenario:
         raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
     states = column_states(scenario, bands)
-    with listening(None if listener is None else _Beforehand(listener)):
+    with listening(None if listener is None else Unheard(listener)):
         fields = _optical_depths(states.atmosphere, bands)
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
     flags = flags | _flags(states, fields["outside_fitted_range"])
-    options = {"gases": gases, "num_streams": num_streams, "error_budget": error_budget}
-    with listening(listener):
-        fields |= _reflectances(states, flags, bands, options)
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
     distance = sun_distance(scenario["time"].values) if "time" in scenario.variables else 1.0
-    light = [solar_irradiance(band, satellite) / (np.pi * distance**2) for band in bands]
-    fields["radiance"] = fields["reflectance_factor"] * np.array(light)
-    for band in set(bands) & set(THERMAL):
-        with listening(listener):
-            seen = _radiance(states, flags, band, satellite, distance, options)
-        fields["radiance"][:, bands.index(band)] = seen
-        fields["brightness_temperature"] = np.asarray(
-            brightness_temperature(jnp.asarray(seen), band, satellite)
-        )
+    settings = {"gases": gases, "num_streams": num_streams, "error_budget": error_budget}
+    fields |= light(states, flags, bands, satellite, distance, settings, listener)
     shape = horizontal(scenario)
     result = scenario.sel(band=list(bands))
     for name, values in fields.items():
@@ -131,58 +115,6 @@ def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:
     """Bits of ``quality_flag`` (column) of the states themselves, as `quality_flags` has them."""
     sun, view = states.geometry.solar_zenith, states.geometry.view_zenith
     return flags_from(np.asarray(sun), np.asarray(view), share_outside)
-
-
-class _Beforehand(NamedTuple):
-    """Hears for a listener of what is compiled, but not of columns, which are solved later."""
-
-    listener: Listener
-
-    def compiling(self, begins: bool) -> None:
-        self.listener.compiling(begins)
-
-    def solved(self, columns: int) -> None:
-        pass
-
-
-def _reflectances(
-    states: State, flags: np.ndarray, bands: tuple[str, ...], options: dict
-) -> dict[str, np.ndarray]:
-    """Reflectance factor and brf (column, band) of the columns that can be solved."""
-    solar = tuple(band for band in bands if band not in THERMAL)
-    solved = np.flatnonzero((flags & _UNSOLVED) == 0)
-    values = np.full((len(flags), len(bands)), np.nan)
-    if solved.size and solar:
-        index = np.array([bands.index(band) for band in solar])
-        values[np.ix_(solved, index)] = brf(_some(states, solved), solar, **options)
-    factor = np.cos(states.geometry.solar_zenith)[:, None] * values
-    in_sight = (flags & QUALITY_FLAGS["out_of_sight"]) == 0
-    night = ((flags & QUALITY_FLAGS["night"]) > 0) & in_sight
-    factor[np.ix_(night, np.array([band in solar for band in bands]))] = 0.0
-    return {"reflectance_factor": factor, "brf": values}
-
-
-def _radiance(
-    states: State,
-    flags: np.ndarray,
-    band: str,
-    satellite: str,
-    distance: float,
-    options: dict,
-) -> Any:
-    """Radiance in one band that emits (column), NaN where nothing can be seen."""
-    solved = np.flatnonzero((flags & _UNSEEN) == 0)
-    values = np.full(len(flags), np.nan)
-    if solved.size:
-        seen = radiance(
-            _some(states, solved), (band,), satellite=satellite, sun_distance=distance, **options
-        )
-        values[solved] = np.asarray(seen)[:, 0]
-    return values
-
-
-def _some(states: State, index: np.ndarray) -> State:
-    return jax.tree.map(lambda x: x[index], states)
 
 
 def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str, np.ndarray]:

@@ -208,7 +208,7 @@ def test_variables_that_the_scene_does_not_have_leave_nothing_behind(invoke, tmp
     assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
 
 
-def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
+def test_gases_ice_fires_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
     """Of another satellite, with cloud ice in a corner and the emissivity of a surface type."""
     with netCDF4.Dataset(inputs.wrf, "a") as file:
         file["QICE"][0, 20, :3, :3] = 1e-5
@@ -217,6 +217,7 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
     options = ["--albedo", inputs.albedo, "--ocean-albedo", 0.03, "--num-streams", 2]
     options += ["--bands", "C04,C07", "--emissivity", "open shrubland", "--satellite", "GOES-18"]
     options += ["--hydrometeors", "ice", "--microphysics", "wsm6", "--time", 0]
+    options += ["--fires", inputs.fires]
     out = tmp_path / "out"
     outcome = invoke("simulate", inputs.wrf, *options, "--out", out)
     assert outcome.exit_code == 0, outcome.output
@@ -227,6 +228,8 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         "emissivity of the ground in C07: 0.89 (open shrubland) over land, 0.978 over water",
         "temperature of the ground: the model's",
         "not simulated (rain)",
+        "fires: 15 in ",
+        " share a column with others",
         "snow mixing ratio below 0, taken as 0: in 2 cells, down to -2e-09 kg kg-1",
     ):
         assert line in outcome.output
@@ -241,8 +244,11 @@ def test_gases_ice_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         assert ice[:3, :3].all() and ice.sum() == 9
         vapour_hides = result["brf"].sel(band="C04").values[0] < 0.1
         assert (vapour_hides | ice).all() and vapour_hides.any()
-        temperature = result["brightness_temperature"].values
-        assert ((temperature > 270) & (temperature < 330)).all()
+        temperature = result["brightness_temperature"].values[0]
+        burns = result["fire_fraction"].values[0] > 0
+        assert ((temperature[~burns] > 270) & (temperature[~burns] < 330)).all()
+        assert np.median(temperature[burns]) > temperature[~burns].max()
+        assert result.attrs["fires_file"] == inputs.fires.name
         assert np.isfinite(result["radiance"]).all()
     assert complaints(out / "result.nc") == []
 
@@ -415,6 +421,7 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
         (["--variables", "radiances"], "variables ['radiances'] are not those of a result"),
         (["--satellite-longitude", "90"], "GOES-19 without --satellite-longitude, or"),
+        (["--fires", "none.csv"], "none.csv does not exist"),
         (["--plume-species", "dust"], "'dust' is not one of"),
     ],
 )

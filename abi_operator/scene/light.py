@@ -1,0 +1,124 @@
+"""What columns send to the imager: sunlight alone, or sunlight and emission as one radiance.
+
+A column is solved for as little as it needs. Where nothing shines the answer to sunlight is
+enough, by day; in C07 all columns shine, and in C05 and C06 those in which it burns, day and night.
+"""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..atmosphere import State
+from ..machine.listening import Listener, listening
+from ..nomenclature import QUALITY_FLAGS
+from ..planck import brightness_temperature
+from ..radiance import FIRE_BANDS, THERMAL, radiance
+from ..reflectance import brf
+from ..satellites import solar_irradiance
+
+# Pixels with one of these flags are not solved; those of a night may shine.
+_UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
+_UNSOLVED = _UNSEEN | QUALITY_FLAGS["night"]
+
+
+class Unheard(NamedTuple):
+    """Hears for a listener of what is compiled, but not of columns that it does not count."""
+
+    listener: Listener
+
+    def compiling(self, begins: bool) -> None:
+        self.listener.compiling(begins)
+
+    def solved(self, columns: int) -> None:
+        pass
+
+
+def light(
+    states: State,
+    flags: np.ndarray,
+    bands: tuple[str, ...],
+    satellite: str,
+    distance: float,
+    settings: dict[str, Any],
+    listener: Listener | None = None,
+) -> dict[str, np.ndarray]:
+    """Reflectance factor, brf and radiance of columns (column, band); with C07 its temperature.
+
+    Parameters
+    ----------
+    states
+        Columns.
+    flags
+        Their ``quality_flag`` (column): which cannot be solved.
+    bands, satellite, distance
+        Names of the bands, and of the satellite; distance of the sun. [AU]
+    settings
+        Others of the operator, by name.
+    listener
+        Is told of columns as they are solved, burning ones of C05 and C06 not twice.
+    """
+    with listening(listener):
+        fields = _of_sunlight(dataclasses.replace(states, fire=None), flags, bands, settings)
+    irradiance = np.array([solar_irradiance(x, satellite) / (np.pi * distance**2) for x in bands])
+    fields["radiance"] = fields["reflectance_factor"] * irradiance
+    mu0 = np.cos(np.asarray(states.geometry.solar_zenith))
+    for k, band in enumerate(bands):
+        shines = _shining(states, flags, band)
+        if not shines.any():
+            continue
+        counted = listener is None or band in THERMAL
+        with listening(listener if counted else Unheard(listener)):
+            seen = radiance(
+                _some(states, shines),
+                (band,),
+                satellite=satellite,
+                sun_distance=distance,
+                **settings,
+            )
+        fields["radiance"][shines, k] = np.asarray(seen)[:, 0]
+        if band not in THERMAL:
+            factor = fields["radiance"][shines, k] / irradiance[k]
+            fields["reflectance_factor"][shines, k] = factor
+            day = mu0[shines] > 0
+            fields["brf"][shines, k] = np.where(day, factor / np.where(day, mu0[shines], 1), np.nan)
+    if "C07" in bands:
+        seen = jnp.asarray(fields["radiance"][:, bands.index("C07")])
+        fields["brightness_temperature"] = np.asarray(
+            brightness_temperature(seen, "C07", satellite)
+        )
+    return fields
+
+
+def _shining(states: State, flags: np.ndarray, band: str) -> np.ndarray:
+    """Which columns have to be solved for their emission in a band (column)."""
+    seen = (flags & _UNSEEN) == 0
+    if band in THERMAL:
+        return seen
+    if band not in FIRE_BANDS or states.fire is None:
+        return np.zeros_like(seen)
+    return seen & (np.asarray(states.fire.fraction) > 0)
+
+
+def _of_sunlight(
+    states: State, flags: np.ndarray, bands: tuple[str, ...], settings: dict[str, Any]
+) -> dict[str, np.ndarray]:
+    """Reflectance factor and brf (column, band) of the columns that can be solved."""
+    solar = tuple(band for band in bands if band not in THERMAL)
+    solved = (flags & _UNSOLVED) == 0
+    values = np.full((len(flags), len(bands)), np.nan)
+    if solved.any() and solar:
+        index = np.array([bands.index(band) for band in solar])
+        values[np.ix_(solved, index)] = brf(_some(states, solved), solar, **settings)
+    factor = np.cos(states.geometry.solar_zenith)[:, None] * values
+    in_sight = (flags & QUALITY_FLAGS["out_of_sight"]) == 0
+    night = ((flags & QUALITY_FLAGS["night"]) > 0) & in_sight
+    factor[np.ix_(night, np.array([band in solar for band in bands]))] = 0.0
+    return {"reflectance_factor": factor, "brf": values}
+
+
+def _some(states: State, chosen: np.ndarray) -> State:
+    index = np.flatnonzero(chosen)
+    return jax.tree.map(lambda x: x[index], states)
