@@ -15,6 +15,7 @@ from abi_operator import Fire, LiquidCloud, MiePlume, Plume
 from abi_operator.constants import WATER_DENSITY
 from abi_operator.optics import effective_radius, mie_optics
 
+from .mass_loading import DENSITY, MassLoading
 from .quantities import Derived, Quantity, itself, logit_shifted, replaced
 from .results import expected_error
 from .state_vector import StateVector
@@ -135,7 +136,7 @@ def plume(
         Whether its single-scattering albedo is retrieved; not of a `MiePlume`, which has none of
         its own.
     effective_radius
-        Whether its effective radius is.
+        Whether its effective radius is; of ash and dust the mass loading follows.
     aod_limit
         Optical depths from here on are out of reach. [-]
     """
@@ -150,6 +151,11 @@ def plume(
         if species not in _RADII:
             raise ValueError(f"no Mie table of {species!r}; choose from {list(_RADII)}.")
         quantities.append(effective_radius_um(species))
+        if species in DENSITY:
+            words = f"mass of the {species} plume, at {DENSITY[species]:g} kg m-3"
+            needs = ("aod_550", "effective_radius_um")
+            place, read = f"atmosphere.plumes.{species}", MassLoading(species)
+            derived.append(Derived("mass_loading", "g m-2", words, place, read, needs))
     return StateVector(tuple(quantities), tuple(derived))
 
 

@@ -45,9 +45,13 @@ def test_retrieve_and_score(folder, run):
     csv = folder / "scores.csv"
     answer = run("score", folder / "result.nc", out, "--csv", csv)
     assert answer.exit_code == 0, answer.output
-    assert answer.output.split("\n")[0].split() == "N bias rmse max r slope inside EE".split()
+    heads = "N bias rmse max r slope inside EE 68 % 95 % chi2".split()
+    assert answer.output.split("\n")[0].split() == heads
     assert "success: " in answer.output
     assert csv.read_text().startswith("group,num_pairs,bias,rmse,max_error,")
+    answer = run("score", folder / "result.nc", out, "--plot", folder / "drawn")
+    assert answer.exit_code == 0, answer.output
+    assert (folder / "drawn" / "aod_550_scatter.png").is_file()
     image = folder / "image.nc"
     with xr.open_dataset(folder / "result.nc", decode_times=False) as result:
         result.drop_vars(["pressure", "smoke_ssa", "smoke_aod_550"]).to_netcdf(image)
