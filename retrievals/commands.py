@@ -1,6 +1,7 @@
 """Commands that `abi_operator`'s command line finds by their entry points."""
 
 from importlib import import_module
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +16,7 @@ from abi_operator.radiance import FIRE_BANDS
 from .fires import BACKGROUNDS
 from .images import REFLECTIVE
 from .kinds import KINDS, retrieve_kind, retrieve_smoke, vector_of
-from .prior_file import read_prior
+from .prior_file import DECLARED, read_prior
 from .scoring import format_report, score_retrieval
 
 RETRIEVAL = "retrieval.nc"
@@ -64,6 +65,13 @@ def retrieve(
         bool,
         typer.Option(help="Write averaging kernels, gains and errors by source, too."),
     ] = False,
+    smooth: Annotated[
+        float | None,
+        typer.Option(
+            help="Retrieve the image as a whole: pixels up to about so many pixels apart are "
+            "alike. With the 'declared' prior unless --prior names one."
+        ),
+    ] = None,
     where: Annotated[
         str | None,
         typer.Option(
@@ -92,6 +100,7 @@ def retrieve(
             )
         )
         _check_background(kind, background)
+        prior = _smooth_prior(kind, smooth, diagnostics, prior)
         if where not in (None, "all"):
             raise ValueError(f"--where is 'all' or nothing; got {where!r}.")
         vector = vector_of(kind, retrieve_ssa, effective_radius)
@@ -99,6 +108,7 @@ def retrieve(
         raise typer.BadParameter(str(error)) from None
     how: dict[str, Any] = {} if background is None else {"background": background}
     how |= {} if where is None else {"where": where}
+    how |= {} if smooth is None else {"smooth": smooth}
     with one_sentence(), read_result(result) as dataset:
         retrieval = retrieve_kind(
             dataset,
@@ -117,6 +127,21 @@ def retrieve(
         retrieval.attrs["history"] = "\n".join([event, str(dataset.attrs["history"])])
         _write(retrieval, out)
     typer.echo(f"wrote {out}")
+
+
+def _smooth_prior(
+    kind: str, smooth: float | None, diagnostics: bool, prior: str | None
+) -> str | None:
+    """The prior that is used, as smoothness needs one."""
+    if smooth is None:
+        return prior
+    if kind == "fire":
+        raise ValueError("--smooth is of plumes and cloud; a fire is one pixel's.")
+    if diagnostics:
+        raise ValueError("--diagnostics are of single pixels; leave out --smooth.")
+    if not 0 < smooth < inf:
+        raise ValueError(f"--smooth is a length above 0 pixels; got {smooth:g}.")
+    return DECLARED if prior is None else prior
 
 
 def _check_background(kind: str, background: str | None) -> None:

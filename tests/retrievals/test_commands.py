@@ -84,6 +84,22 @@ def test_a_prior_from_a_file_and_diagnostics(folder, run):
         assert written.attrs["prior"] == "normal distribution"
 
 
+def test_an_image_is_retrieved_as_a_whole(folder, run):
+    result, out = folder / "result.nc", folder / "smooth.nc"
+    answer = run("retrieve", "smoke", result, "--out", out, "--noise", "--smooth", "1.5")
+    assert answer.exit_code == 0, answer.output
+    with xr.open_dataset(out) as written:
+        assert written.attrs["smooth_length_in_pixels"] == 1.5
+        assert written.attrs["prior"] == "normal distribution"
+        assert np.isfinite(written["aod_550_sigma"]).all()
+        assert (written["num_steps"] > 0).all()
+    for options in (("--smooth", "0"), ("--smooth", "2", "--diagnostics")):
+        answer = run("retrieve", "smoke", result, "--out", out, *options)
+        assert answer.exit_code == 2 and "--smooth" in answer.stderr
+    answer = run("retrieve", "fire", result, "--out", out, "--smooth", "2")
+    assert answer.exit_code == 2 and "a fire is one pixel's" in answer.stderr
+
+
 def test_the_demonstration_ends_with_scores(folder, capsys):
     finish_demo(folder)
     with xr.open_dataset(folder / "retrieval.nc") as written:
