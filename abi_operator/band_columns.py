@@ -18,6 +18,7 @@ from .lambertian import Lambertian
 from .optics import column_optics, num_terms
 from .planck import in_band_radiance
 from .solver import cos_scattering_angle
+from .sun_path import sun_secant
 from .surface import surface_emission
 
 HARMLESS_ZENITH = 1.0
@@ -124,7 +125,7 @@ def columns_of_bands(
 
     inputs, copied = by_band(inputs, copied, bands)
     by_term, by_layer = _mapped(layers, inputs, copied, bands)
-    by_term = [jnp.swapaxes(x, 0, 1) for x in by_term]
+    by_term = {name: jnp.swapaxes(x, 0, 1) for name, x in by_term.items()}
     found = []
     for (emits, _), rows in groups.items():
         names = tuple(bands[k] for k in rows)
@@ -139,8 +140,11 @@ def columns_of_bands(
         shared = tuple(rows[k] for _, k in places)
         of_terms = tuple(t * len(bands) + rows[k] for t, k in places)
         own_rows = tuple(k for _, k in places)
-        tau, ssa, weight = (_rows(x.reshape(-1, *x.shape[2:]), of_terms) for x in by_term)
-        arguments = {x: _rows(y, shared) for x, y in by_layer.items()} | {"tau": tau, "ssa": ssa}
+        arguments = {x: _rows(y, shared) for x, y in by_layer.items()}
+        arguments |= {
+            name: _rows(x.reshape(-1, *x.shape[2:]), of_terms) for name, x in by_term.items()
+        }
+        weight = arguments.pop("weight")
         arguments |= jax.tree.map(lambda x, rows=own_rows: _rows(x, rows), of_group)
         found.append(BandColumns(arguments, weight, names, own_rows, emits))
     return tuple(found)
@@ -183,12 +187,18 @@ def _(chosen: tuple[int, ...], primals: Any, tangents: Any) -> tuple[Array, Arra
 
 
 def _layers(state: State, band: SomeBand, gases: tuple[str, ...], num_moments: int) -> Any:
-    """Extinction, single-scattering albedo and weight of all terms, and what terms share."""
+    """Extinction, single-scattering albedo and weight of all terms (and the sun's secants, where
+    they are not 1 / mu0), and what terms share.
+    """
     geometry = state.geometry
     mu0 = jnp.cos(above_horizon(geometry.solar_zenith))
     mu = jnp.cos(above_horizon(geometry.view_zenith))
     angles = mu0, mu, geometry.relative_azimuth
     optics = column_optics(state.atmosphere, band, gases)
+    by_term = {"tau": optics.tau, "ssa": optics.ssa, "weight": optics.weight}
+    if geometry.spherical:
+        height = state.atmosphere.height
+        by_term["secant"] = sun_secant(height, above_horizon(geometry.solar_zenith), optics.tau)
     shared = {
         "moments": optics.moments(num_moments),
         "phase_function": optics.phase_function(cos_scattering_angle(*angles)),
@@ -196,7 +206,7 @@ def _layers(state: State, band: SomeBand, gases: tuple[str, ...], num_moments: i
         "mu": mu,
         "relative_azimuth": geometry.relative_azimuth,
     }
-    return (optics.tau, optics.ssa, optics.weight), shared
+    return by_term, shared
 
 
 def ground_of(state: State, band: AnyName) -> Any:

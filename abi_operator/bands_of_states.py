@@ -160,10 +160,9 @@ def _terms(columns: BandColumns, arguments: dict[str, Any], settings: Settings) 
         "num_streams": settings.num_streams,
         "num_modes": settings.num_modes,
         "num_doublings": settings.num_doublings,
+        "error_budget": settings.error_budget,
     }
-    if columns.emit:
-        return toa_radiance(**arguments, **how)
-    return toa_brf(**arguments, **how, error_budget=settings.error_budget)
+    return toa_radiance(**arguments, **how) if columns.emit else toa_brf(**arguments, **how)
 
 
 def _without_depth_of_opaque(columns: BandColumns) -> Array:

@@ -17,11 +17,15 @@ class Geometry(eqx.Module):
     relative_azimuth
         Azimuth of the satellite minus azimuth of the sun, both seen from the ground: 0 with sun
         and satellite on the same side (backscatter), pi where a mirror would glint. [rad]
+    spherical
+        Whether a low sun shines through the layers of a sphere (`sun_secant`): flat up to 65
+        degrees from the zenith, spherical from 70 on, and smooth in between.
     """
 
     solar_zenith: Float[Array, "*batch"]
     view_zenith: Float[Array, "*batch"]
     relative_azimuth: Float[Array, "*batch"]
+    spherical: bool = eqx.field(default=False, static=True)
 
     @property
     def mu0(self) -> Float[Array, "*batch"]:

@@ -40,7 +40,7 @@ class Request(NamedTuple):
         Of the ground in C07, as `scene.scenario` takes it.
     land_albedo, sea_ice_albedo, snow_albedo
         As `scene.scenario` takes them. [-]
-    gases, hydrometeors, microphysics, droplet_number, cloud_optics, ice_optics
+    gases, hydrometeors, microphysics, droplet_number, cloud_optics, ice_optics, flat_sun
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
     satellite, satellite_longitude
         Name; degrees, east positive, where it does not stand at its usual place.
@@ -72,6 +72,7 @@ class Request(NamedTuple):
     droplet_number: DropletNumber | None = None
     cloud_optics: str = LIQUID_OPTICS[0]
     ice_optics: str = ICE_OPTICS[0]
+    flat_sun: bool = False
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
     time: int | str | None = None

@@ -22,8 +22,7 @@ class Settings(NamedTuple):
         be read: columns with a layer thicker than 1000 are NaN there.
     error_budget
         Relative error of the reflectance that may be made for speed on top of what the streams
-        leave, such as 1e-3; see `solver.Settings`. None solves everything, and bands that emit
-        always do.
+        leave, such as 1e-3; see `solver.Settings`. None solves everything.
     """
 
     satellite: str = "GOES-16"

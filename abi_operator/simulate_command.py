@@ -154,6 +154,14 @@ def simulate(
             "severely roughened crystals of many habits.",
         ),
     ] = ICE_OPTICS[0],
+    flat_sun: Annotated[
+        bool,
+        typer.Option(
+            "--flat-sun",
+            help="Let a sun lower than 25 degrees shine through flat layers, and not through those "
+            "of a sphere.",
+        ),
+    ] = False,
     satellite: Annotated[
         str, typer.Option(help=f"Whose imager looks: {', '.join(SATELLITES)}.")
     ] = "GOES-16",
@@ -179,7 +187,7 @@ def simulate(
         typer.Option(
             min=0,
             help="Relative error of the reflectance that may be made for speed, in 99 of 100 "
-            "pixels; with 0 nothing is left out, as never in C07.",
+            "pixels; with 0 nothing is left out.",
         ),
     ] = ERROR_BUDGET,
     variables: Annotated[
@@ -241,6 +249,7 @@ def simulate(
         droplet_number=droplets,
         cloud_optics=cloud_optics,
         ice_optics=ice_optics,
+        flat_sun=flat_sun,
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=num_streams,

@@ -194,6 +194,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         droplet_number=request.droplet_number,
         cloud_optics=request.cloud_optics,
         ice_optics=request.ice_optics,
+        flat_sun=request.flat_sun,
         standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )

@@ -20,6 +20,7 @@ FLOORS = [
     {"optics_and_solver", "state_checks"},
     {"bands_of_states"},
     {"band_columns", "settings"},
+    {"sun_path"},
     {"optics", "solver", "surface"},
     {"lambertian", "microphysics", "optical_properties", "plume_edges", "standard_atmospheres"},
     {"atmosphere"},
@@ -90,7 +91,7 @@ def test_rooms_that_have_not_heard_of_each_other():
 
 
 # Whose words about the compiler still stand beside the steps that they are about.
-SPEAK_OF_THE_COMPILER = "machine", "solver/method", "solver/gradient", "solver/program.py"
+SPEAK_OF_THE_COMPILER = "machine", "solver/method", "solver/gradient", "solver/problem.py"
 
 
 def test_the_compiler_is_spoken_of_in_the_machine_alone():

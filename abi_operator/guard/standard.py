@@ -115,7 +115,7 @@ def _column(
     return State(
         air,
         {band: jnp.asarray(_ALBEDO[band]) for band in every},
-        Geometry(*(jnp.asarray(angle) for angle in angles)),
+        _seen_under(angles),
         surface_temperature=jnp.asarray(297.0),
         fire=Fire(jnp.asarray(fire_fraction), jnp.asarray(fire_temperature)),
     )
@@ -151,8 +151,13 @@ def _on_rough_ground(
     return State(
         air,
         {band: ocean(wind, band) for band in _SEA} | dict.fromkeys(_LAND, grass),
-        Geometry(*(jnp.asarray(angle) for angle in angles)),
+        _seen_under(angles),
     )
+
+
+def _seen_under(angles: tuple[float, float, float]) -> Geometry:
+    sun, view, azimuth = (jnp.asarray(angle) for angle in angles)
+    return Geometry(sun, view, azimuth)
 
 
 def _in_layer(layer: int, mass: float, number_per_mass: float) -> tuple[Array, Array]:

@@ -112,32 +112,35 @@ def map_tiles(
     if count == 1:
         return function(columns)
 
-    numbers = None if need is None else need(columns)
-    order = None if numbers is None else in_order(numbers)
-    place = None if order is None else _places(order)
-
     # Columns are cut into tiles while their axis is the first, as callers give them, and turned
     # one tile at a time, in the cache: XLA drops what turns all of them to and fro.
-    def tiled(x: Array) -> Array:
+    def tiled(x: Array, order: Array | None = None) -> Array:
         padding = [(0, count * width - size)] + [(0, 0)] * (x.ndim - 1)
         first = jnp.pad(_taken(jnp.moveaxis(x, -1, 0), order), padding, mode="edge")
         return first.reshape(count, width, *first.shape[1:])
 
-    def joined(x: Array) -> Array:
+    def joined(x: Array, place: Array | None = None) -> Array:
         first = x.reshape(count * width, *x.shape[2:])[:size]
         return jnp.moveaxis(_taken(first, place), 0, -1)
 
-    def of_tile(columns: Any) -> Any:
-        result = function(jax.tree.map(lambda x: jnp.moveaxis(x, 0, -1), columns))
-        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), result)
+    def by_tiles(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        def of_tile(columns: Any) -> Any:
+            result = function(jax.tree.map(lambda x: jnp.moveaxis(x, 0, -1), columns))
+            return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), result)
 
-    def mapped(tiles: Any) -> Any:
-        # Reverse mode computes a tile again when its turn comes: its memory is that of a tile.
-        return jax.lax.map(jax.checkpoint(of_tile), tiles)
+        def mapped(tiles: Any) -> Any:
+            # Reverse mode computes a tile again when its turn comes: its memory is that of a tile.
+            return jax.lax.map(jax.checkpoint(of_tile), tiles)
 
-    if len(devices) > 1:
-        mapped = _divided(mapped, devices, _SHARE)
-    return jax.tree.map(joined, mapped(jax.tree.map(tiled, columns)))
+        return _divided(mapped, devices, _SHARE) if len(devices) > 1 else mapped
+
+    order = place = None
+    if need is not None and jax.eval_shape(need, columns) is not None:
+        numbers = joined(by_tiles(need)(jax.tree.map(tiled, columns)))
+        order = jnp.argsort(numbers)
+        place = _places(order)
+    found = by_tiles(function)(jax.tree.map(lambda x: tiled(x, order), columns))
+    return jax.tree.map(lambda x: joined(x, place), found)
 
 
 def _taken(x: Array, order: Array | None) -> Array:
@@ -145,11 +148,6 @@ def _taken(x: Array, order: Array | None) -> Array:
     if order is None:
         return x
     return x.at[order].get(mode="promise_in_bounds", unique_indices=True)
-
-
-def in_order(need: Array) -> Array | None:
-    """Places of columns, those first that need least."""
-    return jnp.argsort(need)
 
 
 def _places(order: Array) -> Array:

@@ -197,7 +197,7 @@ def cut(size: int, widths: Sequence[int], num_cores: int) -> list[tuple[int, int
     Large chunks, as many on every core; smaller ones for what is left, so that cores end together.
     """
     *smaller, largest = widths
-    if not smaller or size == largest:
+    if not smaller:
         return _evenly(0, size, largest)
     share = size // (largest * num_cores) * num_cores * largest
     if size - share > largest * num_cores - smaller[-1]:

@@ -12,6 +12,7 @@ from ..geometry import Geometry
 from ..nomenclature import PLUME
 from .cloud_optics import cloud_optics_of, ice_optics_of
 from .species import classes_of, species_of
+from .sun import spherical_somewhere
 
 _GASES = ("vapour", "ozone")
 _MOLE_FRACTIONS = ("carbon_dioxide", "methane", "nitrous_oxide")
@@ -33,7 +34,8 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     State
         NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
         faster. Gases, temperatures and hydrometeors are those that the scenario has, and clouds
-        scatter as its attributes say (`cloud_optics_of`, `ice_optics_of`).
+        scatter as its attributes say (`cloud_optics_of`, `ice_optics_of`), through which a low sun,
+        where there is one, shines likewise (`spherical_somewhere`).
     """
     bands = check_bands(bands, [str(band) for band in scenario["band"].values])
     reader = _Reader(scenario)
@@ -77,7 +79,7 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     return State(
         atmosphere,
         surface_albedo,
-        Geometry(**angles),
+        Geometry(**angles, spherical=spherical_somewhere(scenario, angles["solar_zenith"])),
         surface_temperature=reader.optional("surface_temperature"),
     )
 

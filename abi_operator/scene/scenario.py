@@ -55,6 +55,7 @@ def scenario(
     droplet_number: DropletNumber | None = None,
     cloud_optics: str = LIQUID_OPTICS[0],
     ice_optics: str = ICE_OPTICS[0],
+    flat_sun: bool = False,
     standard_atmosphere: str | None = None,
     added_heights: Sequence[float] | None = None,
     rows: slice = slice(None),
@@ -108,6 +109,9 @@ def scenario(
     ice_optics
         Whose asymmetry factor crystals have: ``"fu"``, smooth columns, or ``"rough"``; see
         `Hydrometeor`.
+    flat_sun
+        Whether a low sun shines through flat layers, and not through those of a sphere from a solar
+        zenith angle of 65 degrees on (`sun_secant`).
     standard_atmosphere
         Name of the one that gives ozone, and what is above the model; None for the nearest
         (`nearest_standard_atmosphere`). The blocks of a scene need the same.
@@ -195,6 +199,7 @@ def scenario(
         "satellite_longitude": satellite_longitude,
         "gases": gases_attribute(gases),
         **optics_attributes(cloud_optics, ice_optics),
+        "sun_path": "flat" if flat_sun else "spherical",
         "air_above_model": "US Standard Atmosphere 1976, scaled to the pressure at the model's top",
         "num_levels_above_model": len(added_heights),
         "assumed_droplet_number": condensate.droplets.number.describe(model),

@@ -21,9 +21,10 @@ from .column import (
     names,
     own_axes,
 )
+from .foreknown import need
 from .method.doublings import unknown_doublings
-from .program import need
 from .settings import Settings, check_settings
+from .skipping import company
 
 
 def solve(
@@ -123,16 +124,19 @@ class _Program(NamedTuple):
         )
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
-        skips = self.options.error_budget is not None
-        return chunks_of_columns(self.options.num_streams, leaves[0].dtype, in_order=skips)
+        streams, dtype = self.options.num_streams, leaves[0].dtype
+        return chunks_of_columns(streams, dtype, in_order=self._in_order)
 
     def tile(self, leaves: Leaves) -> int:
         return tile_size(self.options.num_streams, jnp.result_type(*leaves))
 
     def need(self, leaves: Leaves) -> Array | None:
-        if self.options.error_budget is None:
-            return None
-        return need(self._aligned(leaves), self.options)
+        return need(self._aligned(leaves), self.options) if self._in_order else None
+
+    @property
+    def _in_order(self) -> bool:
+        skips = self.options.error_budget is not None
+        return skips and self.options.num_streams >= company.SORTED_FROM
 
     def value(self, leaves: Leaves) -> Any:
         return self._outward(self.solve(self._aligned(leaves), self.options))

@@ -11,14 +11,14 @@ from .column import Column, Options, promoted
 from .door import solve
 from .method.surface import AnySurface
 from .program import emerging, radiance_of_one_view
-from .settings import OfViews, Settings
+from .settings import OfReflectances, Settings
 from .views import of_views
 
 # A sun of irradiance 0 may stand anywhere; below this cosine it is moved to where it does no harm.
 _LOWEST_SUN, _SOMEWHERE_ELSE = 1e-3, 0.5
 
 
-@with_keywords(OfViews, Settings())
+@with_keywords(OfReflectances, Settings())
 def toa_radiance(
     tau: Float[ArrayLike, "*batch layer"],
     ssa: Float[ArrayLike, "*batch layer"],
@@ -34,7 +34,7 @@ def toa_radiance(
     isotropic_top: Float[ArrayLike, "*batch"] | float = 0.0,
     phase_function: Float[ArrayLike, "*batch layer"] | None = None,
     secant: Float[ArrayLike, "*batch layer"] | None = None,
-    **settings: Unpack[OfViews],
+    **settings: Unpack[OfReflectances],
 ) -> Float[Array, "*batch"]:
     r"""Radiance at the top of the atmosphere, in the units of its sources.
 

@@ -81,13 +81,15 @@ def test_droplet_numbers_and_optics_can_be_chosen(invoke, tmp_path, inputs):
     options = ["--ocean-albedo", 0.03, "--bands", "C01", "--num-streams", 2]
     options += ["--albedo", inputs.albedo, "--droplet-number"]
     depths = []
-    for number, kind in (("250", ()), ("250,500", ("--cloud-optics", "mitchell"))):
+    paper = "--cloud-optics", "mitchell", "--flat-sun"
+    for number, kind in (("250", ()), ("250,500", paper)):
         out = tmp_path / number
         outcome = invoke("simulate", inputs.wrf, *options, number, *kind, "--out", out)
         assert outcome.exit_code == 0, outcome.output
         with read_result(out / "result.nc") as result:
             depths.append(result["liquid_optical_depth"].values)
             assert result.attrs["cloud_optics"] == (kind or ("", "mie"))[1]
+            assert result.attrs["sun_path"] == ("flat" if kind else "spherical")
             assert (
                 scene.column_states(result.isel(time=0), ("C01",)).atmosphere.liquid.optics
                 == (result.attrs["cloud_optics"])

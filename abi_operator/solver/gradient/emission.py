@@ -7,6 +7,8 @@ A radiance is one number a view: with the sun's weights c_m and reflections r_m 
 of the mean's Y and e at the top (`method.adding`), but for the Planck function B at the top, which
 is added outside. So there is one adjoint field a mode for both lights, and in the mean the source
 is that of both together (`emitting_mode`): thermal light costs the gradient a few vectors.
+
+An error budget is spent on values (`skipping`); slopes are those of every layer and every mode.
 """
 
 from functools import partial
@@ -14,18 +16,18 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
 from ..method.adding import Emission, add_emitting_layer, add_layer, top
-from ..method.azimuth import mode_kernels
 from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
-from ..method.ground import black, isotropic
-from ..method.layer import half_layer, node_functions
-from ..method.mode_layers import Order, read
+from ..method.ground import isotropic
+from ..method.layer import half_layer
+from ..method.mode_layers import read
+from ..skipping.heat import Warm, lost
+from ..skipping.merging import summed
+from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .emitting_mode import (
     Air,
     Heating,
@@ -33,11 +35,8 @@ from .emitting_mode import (
     slope_of_light_from_above,
     slopes_of_mode,
 )
-from .mode import Kernels
+from .modes import LATER, WHOLE, How, Mode, along, every_mode
 from .room import Keeper
-
-_LATER = slice(1, None)  # modes but the mean
-_WHOLE = 2  # nodes up to which all layers of all modes are one kernel
 
 
 class Lit(NamedTuple):
@@ -66,21 +65,71 @@ class Lit(NamedTuple):
     heating: Heating
 
 
+class Given(NamedTuple):
+    """What is known of a tile beside its inputs.
+
+    Parameters
+    ----------
+    doublings
+        Of every layer, for what solves them all.
+    warm
+        What is left out by it; None where nothing is.
+    """
+
+    doublings: Doublings
+    warm: Warm | None = None
+
+
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
-def radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[Array, "*batch"]:
+def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     """Sum over the modes of weight times reflection, and what the mean emits.
 
     Its derivatives come from its gradient. The rule is linear in the tangents, so that one gradient
     serves forward and reverse mode, and slopes that nobody asks for are not computed.
     """
-    value = partial(_radiance, single_scattering=single_scattering)
     num_nodes = _num_nodes(lit)
-    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(lit, doublings)
+    plan = _plan(lit, given, how)
+    added = jnp.zeros_like(lit.heating.above)
+    if plan.groups is not None:
+        lit, added = _in_groups(lit, given.warm, plan)
+    value = partial(_radiance, single_scattering=how.single_scattering)
+    return added + (one_kernel(value, num_nodes) if num_nodes <= WHOLE else value)(lit, plan)
 
 
-def _radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[Array, "*batch"]:
-    how = doublings, single_scattering
-    first, others = (jax.tree.map(lambda x, i=i: x[i], _modes(lit)) for i in (0, _LATER))
+def _plan(lit: Lit, given: Given, how: How) -> Plan:
+    layers, warm = lit.air.layers, given.warm
+    moments = layers.moments.reshape(2, -1, *layers.moments.shape[1:])
+    of_modes = LayersOfModes(layers.tau, layers.coalbedo, layers.sun_secant, (*moments,))
+    if warm is None:
+        return everything(of_modes, given.doublings)
+    assert how.error_budget is not None
+    return planned(
+        of_modes,
+        lit.air.view_secants[:1],
+        warm.known,
+        how.error_budget,
+        how.most,
+        warm=warm,
+    )
+
+
+def _in_groups(lit: Lit, warm: Warm | None, plan: Plan) -> tuple[Lit, Float[Array, "*batch"]]:
+    """The groups of layers, and unscattered thermal light that they do not have."""
+    assert warm is not None and plan.groups is not None
+    alone, layers = lit.air.layers, plan.layers.as_layers()
+    jumps = summed(plan.groups, lit.heating.jumps)
+    members = alone.tau, alone.coalbedo, lit.heating.jumps
+    solved = layers.tau, layers.coalbedo, jumps
+    how = lit.air.view_secants[0], 2 * _num_nodes(lit)
+    added = lost(warm, plan.groups, members, solved, *how)
+    air, heating = lit.air._replace(layers=layers), lit.heating._replace(jumps=jumps)
+    return lit._replace(air=air, heating=heating), added
+
+
+def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*batch"]:
+    how = plan, single_scattering
+    every = _every(lit)
+    first = jax.tree.map(lambda x: x[0], every)
     light, one = _of_ground(lit), _one(lit)
     stack, light = _stacked(lit, first, lit.ground, light, *how)
     assert light is not None
@@ -88,20 +137,22 @@ def _radiance(lit: Lit, doublings: Doublings, single_scattering: bool) -> Float[
     emitted = closed.emerging(light, one, 0.5 * lit.heating.above, nothing)[1]
     mean = first.weight * closed.reflection()[0] + emitted
 
-    def plus(total, mode):
-        ground = _nothing_below(lit) if mode.ground is None else mode.ground
-        stack, _ = _stacked(lit, mode, ground, None, *how)
-        return total + mode.weight * top(stack).reflection()[0], None
+    def plus(total, mode, counts):
+        stack, _ = _stacked(lit, mode, mode.below(lit.ground, mean=False), None, *how)
+        found = counts * mode.weight * top(stack).reflection()[0]
+        total = total + found
+        share = None if plan.error_budget is None else plan.share(total[None], jnp.abs(found))
+        return total, None, share
 
-    return jax.lax.scan(plus, mean, others)[0]
+    return over_modes(plus, mean, every, 1, None, plan)[0]
 
 
 def _stacked(
     lit: Lit,
-    mode: "_Mode",
+    mode: Mode,
     ground: Bordered,
     light: Emission | None,
-    doublings: Doublings,
+    plan: Plan,
     single_scattering: bool,
 ) -> tuple[Bordered, Emission | None]:
     """All layers of a mode on the ground; only the mean has thermal light."""
@@ -119,16 +170,19 @@ def _stacked(
         return add_emitting_layer(stack, light, y, z, layer.tau, read(jumps, place) * (p @ one))
 
     put_on = one_kernel(put_on, _num_nodes(lit), in_parts=True)
-    shared = lit.air, lit.heating.jumps, doublings, mode.order.odd, _kernels(mode), _one(lit)
 
-    def add(below, *number):
-        return put_on(below, *shared, *number), None
+    def of_all(below, air, jumps, plan, odd, kernels, one):
+        shared = air, jumps, plan.doublings, odd, kernels, one
 
-    tau = lit.air.layers.tau
-    numbers = jnp.arange(tau.shape[0], dtype=tau.dtype)
-    if numbers.size == 1:
-        return add((ground, light))[0]
-    return jax.lax.scan(add, (ground, light), numbers, reverse=True)[0]
+        def add(below, number):
+            return put_on(below, *shared, *([] if number is None else [number]))
+
+        return over_layers(add, below, plan, upwards=True)
+
+    if plan.layers.tau.shape[0] > 1:
+        of_all = one_kernel(of_all, _num_nodes(lit), in_parts=True)
+    shared = lit.air, lit.heating.jumps, plan, mode.order.odd, mode.kernels(), _one(lit)
+    return of_all((ground, light), *shared)
 
 
 def _of_ground(lit: Lit) -> Emission:
@@ -138,14 +192,10 @@ def _of_ground(lit: Lit) -> Emission:
 
 
 @partial(radiance.defjvp, symbolic_zeros=True)
-def _radiance_jvp(single_scattering, primals, tangents):
-    lit, doublings = primals
-    value, gradient = radiance_and_gradient(lit, doublings, single_scattering)
-    change = jnp.zeros_like(value)
-    for slope, tangent in zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents[0]), strict=True):
-        if not isinstance(tangent, SymbolicZero):
-            change = change + jnp.sum(slope * tangent, axis=tuple(range(slope.ndim - value.ndim)))
-    return value, change
+def _radiance_jvp(how, primals, tangents):
+    lit, given = primals
+    value, gradient = radiance_and_gradient(lit, given.doublings, how.single_scattering)
+    return value, along(gradient, tangents[0], value)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
@@ -171,8 +221,8 @@ def radiance_and_gradient(
             doublings,
             single_scattering,
             mode.order,
-            _kernels(mode),
-            _ground(lit, mode),
+            mode.kernels(),
+            mode.below(lit.ground),
             column,
             radiance_at_the_top(above, mode.weight),
             slopes,
@@ -190,10 +240,10 @@ def radiance_and_gradient(
     mean = lit.ground if lit.grounds is None else None, lit.heating
     nothing = jax.tree.map(jnp.zeros_like, (lit.heating.above, lit.air, mean))
     space = Keeper(lit.air.layers.tau, _num_nodes(lit), doublings.most, warm=True).empty()
-    carry, rows = jax.lax.scan(step, (*nothing, space), _modes(lit))
+    carry, rows = jax.lax.scan(step, (*nothing, space), _every(lit))
     (value, air, (ground, heating), _), (reflections, beams, grounds) = carry, rows
     if grounds is not None:
-        ground, grounds = (jax.tree.map(lambda x, i=i: x[i], grounds) for i in (0, _LATER))
+        ground, grounds = (jax.tree.map(lambda x, i=i: x[i], grounds) for i in (0, LATER))
     return value, Lit(air, beams, ground, grounds, reflections, heating)
 
 
@@ -207,48 +257,8 @@ def _second_derivative(single_scattering, primals, tangents):
     return jax.jvp(written_out, (lit,), tangents[:1])
 
 
-class _Mode(NamedTuple):
-    """Of one mode; its ground is None where modes but the first see a black one."""
-
-    order: Order
-    weight: Float[Array, "*batch"]
-    ground: Bordered | None
-    nodes: tuple[Array, Array]
-    beams: tuple[Array, Array]
-
-
-def _modes(lit: Lit) -> _Mode:
-    """What differs from mode to mode, on the first axis."""
-    dtype, num_modes = lit.weights.dtype, lit.weights.shape[0]
-    functions = node_functions(2 * _num_nodes(lit), num_modes)
-
-    def nodes(parity: int) -> Array:
-        rows = [functions[m, (m + parity) % 2 :: 2].T for m in range(num_modes)]
-        return jnp.asarray(np.stack(rows), dtype)
-
-    number = jnp.arange(num_modes, dtype=dtype)
-    order = Order(number % 2, (number == 0).astype(dtype))
-    grounds = lit.grounds
-    if grounds is not None:
-        grounds = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), lit.ground, grounds)
-    return _Mode(order, lit.weights, grounds, (nodes(0), nodes(1)), lit.beams)
-
-
-def _ground(lit: Lit, mode: _Mode) -> Bordered:
-    """Ground of a mode of which it is data whether it is the mean."""
-    if mode.ground is not None:
-        return mode.ground
-    is_mean = mode.order.mean > 0
-    return jax.tree.map(lambda x, y: jnp.where(is_mean, x, y), lit.ground, _nothing_below(lit))
-
-
-def _nothing_below(lit: Lit) -> Bordered:
-    return black(jnp.ones_like(lit.ground.diagonal), 2 * _num_nodes(lit))
-
-
-def _kernels(mode: _Mode) -> Kernels:
-    a, b = (mode_kernels(n, v) for n, v in zip(mode.nodes, mode.beams, strict=True))
-    return a, b
+def _every(lit: Lit) -> Mode:
+    return every_mode(lit.ground, lit.grounds, lit.weights, lit.beams, _num_nodes(lit))
 
 
 def _num_nodes(lit: Lit) -> int:

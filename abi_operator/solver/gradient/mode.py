@@ -35,7 +35,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced, matmul
+from ...machine.algebra import fenced, matmul, total
 from ...machine.kernels import one_kernel
 from ..method.adding import top
 from ..method.bordered import Bordered
@@ -53,14 +53,15 @@ Kernels = tuple[ModeKernels, ModeKernels]
 
 
 class Slopes(NamedTuple):
-    """Of one mode, in what its beams are made of and in its ground; of it and those before it, in
-    what all share.
+    """Of one mode, in what its beams are made of and in its ground, and the sum of the squares of
+    its own in the layers' moments; of it and those before it, in what all share.
     """
 
     shared: "Shared"
     even_beams: Float[Array, "2 degree *batch"]
     odd_beams: Float[Array, "2 degree *batch"]
     ground: Bordered
+    square: Float[Array, "*batch"]
 
 
 class Shared(NamedTuple):
@@ -71,6 +72,34 @@ class Shared(NamedTuple):
     layers: Layers
     view_secant: Float[Array, "*batch"]
     faces: Float[Array, "level row *batch"] | None
+
+
+class _Given(NamedTuple):
+    """What kernels read of a mode."""
+
+    layers: Layers
+    plan: Plan
+    order: Order
+    kernels: Kernels
+    view_secant: Float[Array, "*batch"]
+
+    def layer(self, number: Array) -> tuple[Layer, Doublings]:
+        """A layer, and its doublings."""
+        own = jax.tree.map(lambda x: read(x, number), self.plan.doublings)
+        return self.layers.layer(number, self.order.odd), own
+
+    def place(self, number: Array | None) -> Array:
+        """Number of a layer, of the only one too."""
+        return jnp.zeros_like(self.layers.tau.reshape(-1)[0]) if number is None else number
+
+    def compiled(self, function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
+        """`function` as one kernel.
+
+        A layer that is the only one fills the room: in the kernel XLA finds no use for its number,
+        nor for what was in the room (see `one_kernel`).
+        """
+        num_layers, num_nodes = self.layers.tau.shape[0], self.layers.moments.shape[1]
+        return function if num_layers == 1 else one_kernel(function, num_nodes, **how)
 
 
 def mode_slopes(
@@ -90,39 +119,55 @@ def mode_slopes(
     kernels: as inputs and outputs of a scan every array would be one more kernel a layer.
     """
     layers, view_secant, _ = shared
-    faces = slopes.faces
-    doublings = plan.doublings
-    num_layers, num_nodes = layers.tau.shape[0], layers.moments.shape[1]
-    alone = jnp.zeros_like(layers.tau[:1].reshape(-1)[0])  # number of a layer that is the only one
-    assert doublings.most is not None
-    keeper = Keeper(layers.tau, num_nodes, doublings.most, faces is not None)
+    faces, most = slopes.faces, plan.doublings.most
+    assert most is not None
+    keeper = Keeper(layers.tau, layers.moments.shape[1], most, faces is not None)
+    given = _Given(layers, plan, order, kernels, view_secant)
+    stack, room = _up(ground, room, given, keeper, single_scattering)
+    reflection, fields = given.compiled(_fields_at_the_top, in_parts=True)(stack, weight)
+    beams = (jnp.zeros_like(x.beams) for x in kernels)
+    start = *beams, slopes.view_secant, jnp.zeros_like(view_secant)
+    carry = fields, start, slopes.layers, faces
+    carry = _down(carry, room, given, keeper, single_scattering)
+    fields, (even, odd, view, square), layers, faces = carry
+    if faces is not None:
+        below = fields._replace(other=jnp.zeros_like(fields.other))
+        last = slopes_at_face(below, ground, kernels, view_secant, single_scattering, order)
+        faces = added_to(faces, plan.num_groups, last)
+    shared = Shared(layers, view, faces)
+    return reflection, room, Slopes(shared, even, odd, pair(1.0, [fields]), square)
 
-    def compiled(function: Callable[..., Any], **how: bool) -> Callable[..., Any]:
-        # A layer that is the only one fills the room: in the kernel XLA finds no use for its
-        # number, nor for what was in the room (see `one_kernel`).
-        return function if num_layers == 1 else one_kernel(function, num_nodes, **how)
 
-    def put_on_and_keep(stack, room, layers, doublings, number, order, kernels, view_secant):
-        layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
-        a, p = layer.matrices(order.mean, kernels, view_secant[None], single_scattering)
+def _up(
+    ground: Bordered, room: Room, given: _Given, keeper: Keeper, single_scattering: bool
+) -> tuple[Bordered, Room]:
+    """All layers put on the ground; the room filled with what the way down needs of them."""
+
+    def put_on_and_keep(stack, room, given, number):
+        layer, own = given.layer(number)
+        secant = given.view_secant[None]
+        a, p = layer.matrices(given.order.mean, given.kernels, secant, single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
         stack, new, room = climb(stack, a, p, layer.tau, own, room, keep)
         room = keeper.with_layer(room, new, number)
-        return stack, room if faces is None else keeper.with_stack(room, stack, number)
+        return stack, keeper.with_stack(room, stack, number) if keeper.stacks else room
 
-    put_one = compiled(put_on_and_keep, in_parts=True)
+    put_one = given.compiled(put_on_and_keep, in_parts=True)
 
-    def up(carry, number):
-        number = alone if number is None else number
-        return put_one(*carry, layers, doublings, number, order, kernels, view_secant)
+    def all_layers(ground, room, given):
+        step = lambda carry, number: put_one(*carry, given, given.place(number))  # noqa: E731
+        return over_layers(step, (ground, room), given.plan, upwards=True)
 
-    stack, room = over_layers(up, (ground, room), plan, upwards=True)
-    reflection, fields = _fields_at_the_top(stack, weight)
+    return given.compiled(all_layers, in_parts=True)(ground, room, given)
 
-    @compiled
-    def undo_one(carry, layers, doublings, room, number, order, kernels, view_secant):
+
+def _down(carry: Any, room: Room, given: _Given, keeper: Keeper, single_scattering: bool) -> Any:
+    """Fields, and slopes of beams, layers and faces, from the top to the ground."""
+
+    def undo(carry, room, given, number):
         fields, totals, slopes, faces = carry
-        layer, own = layers.layer(number, order.odd), _of_layer(doublings, number)
+        kernels, order, view_secant = given.kernels, given.order, given.view_secant
+        layer, own = given.layer(number)
         kept, secants = keeper.layer(room, number), layer.secants(view_secant[None])
         # The beams' own entries of the stack are 1 whatever happens in it.
         fields = fields._replace(other=jnp.zeros_like(fields.other))
@@ -141,23 +186,13 @@ def mode_slopes(
         totals, new = _collected(step, layer.tau, totals, a, b, coalbedo)
         return fields, totals, slopes.plus(number, order.odd, new), faces
 
-    def down(carry, number):
-        number = alone if number is None else number
-        return undo_one(carry, layers, doublings, room, number, order, kernels, view_secant)
+    undo_one = given.compiled(undo)
 
-    start = *(jnp.zeros_like(x.beams) for x in kernels), slopes.view_secant
-    carry = over_layers(down, (fields, start, slopes.layers, faces), plan)
-    fields, (even, odd, view), layers, faces = carry
-    if faces is not None:
-        below = fields._replace(other=jnp.zeros_like(fields.other))
-        last = slopes_at_face(below, ground, kernels, view_secant, single_scattering, order)
-        faces = added_to(faces, plan.num_groups, last)
-    shared = Shared(layers, view, faces)
-    return reflection, room, Slopes(shared, even, odd, pair(1.0, [fields]))
+    def all_layers(carry, room, given):
+        step = lambda carry, number: undo_one(carry, room, given, given.place(number))  # noqa: E731
+        return over_layers(step, carry, given.plan)
 
-
-def _of_layer(doublings: Doublings, number: Array) -> Doublings:
-    return jax.tree.map(lambda x: read(x, number), doublings)
+    return given.compiled(all_layers)(carry, room, given)
 
 
 def _fields_at_the_top(stack: Bordered, weight):
@@ -175,4 +210,5 @@ def _collected(step, tau, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
     secants = h * (a.secants + b.secants)
     beams = totals[0] + h * a.beams, totals[1] + h * b.beams
     slopes = Layer(step * (a.h + b.h), h * coalbedo, secants[0], h * a.moments, h * b.moments)
-    return (*beams, totals[2] + secants[1]), slopes
+    square = totals[3] + total(slopes.even**2) + total(slopes.odd**2)
+    return (*beams, totals[2] + secants[1], square), slopes

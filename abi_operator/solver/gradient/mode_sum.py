@@ -9,44 +9,21 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
 from ..method.adding import add_layer, top
-from ..method.azimuth import mode_kernels
 from ..method.bordered import Bordered
 from ..method.doublings import Doublings
-from ..method.ground import black
-from ..method.layer import half_layer, node_functions
-from ..method.mode_layers import Layers, Order, read
+from ..method.layer import half_layer
+from ..method.mode_layers import read
 from ..skipping import budget
 from ..skipping.budget import Expected
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
-from .mode import Kernels, Shared, mode_slopes
+from .mode import Shared, mode_slopes
+from .modes import LATER, WHOLE, How, Mode, along, every_mode
 from .room import Keeper
-
-_LATER = slice(1, None)  # modes but the mean
-_WHOLE = 2  # nodes up to which all layers of all modes are one kernel
-
-
-class How(NamedTuple):
-    """What is static.
-
-    Parameters
-    ----------
-    single_scattering
-        Whether modes contain the light scattered once in a layer and nowhere else.
-    error_budget
-        Relative error of the reflectance that may be made (`skipping`); None solves everything.
-    most
-        Doublings of a layer, at most: slopes have room for so many. None sets no limit to values.
-    """
-
-    single_scattering: bool
-    error_budget: float | None
-    most: int | None
 
 
 class ModeSum(NamedTuple):
@@ -73,6 +50,15 @@ class ModeSum(NamedTuple):
     ground: Bordered
     grounds: Bordered | None
     weights: Float[Array, "mode view *batch"]
+
+    @property
+    def num_nodes(self) -> int:
+        """Half of the streams."""
+        return self.layers.moments[0].shape[1]
+
+    def every_mode(self) -> Mode:
+        """What differs from mode to mode, on the first axis."""
+        return every_mode(self.ground, self.grounds, self.weights, self.beams, self.num_nodes)
 
     def seen_from(self, view: Any) -> "ModeSum":
         """The same with one view."""
@@ -114,9 +100,8 @@ def mode_sum(inputs: ModeSum, given: Given, how: How) -> Float[Array, "view *bat
     """
     plan = _plan(inputs, given, how)
     value = partial(_reflectance, single_scattering=how.single_scattering)
-    num_nodes = inputs.layers.moments[0].shape[1]
-    # With more nodes there is less to gain, and more than twice as much to compile.
-    return (one_kernel(value, num_nodes) if num_nodes <= _WHOLE else value)(inputs, plan)
+    num_nodes = inputs.num_nodes
+    return (one_kernel(value, num_nodes) if num_nodes <= WHOLE else value)(inputs, plan)
 
 
 def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan:
@@ -133,9 +118,9 @@ def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan
 def _reflectance(
     inputs: ModeSum, plan: Plan, single_scattering: bool
 ) -> Float[Array, "view *batch"]:
-    modes = _Modes(inputs, plan)
+    given, num_nodes = plan.layers.as_layers(), inputs.num_nodes
 
-    def reflection(mean: bool, mode: _Mode) -> Array:
+    def reflection(mean: bool, mode: Mode) -> Array:
         def put_on(stack, layers, doublings, odd, kernels, view_secants, *number):
             # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
             place = number[0] if number else jnp.zeros_like(odd)
@@ -144,24 +129,33 @@ def _reflectance(
             own = jax.tree.map(lambda x: read(x, place), doublings)
             return add_layer(stack, *half_layer(a, p, layer.tau, own), layer.tau)
 
-        put_on = one_kernel(put_on, modes.num_nodes, in_parts=True)
-        kernels, views = _kernels(mode.nodes, mode.beams), inputs.view_secants
-        shared = modes.layers, plan.doublings, mode.order.odd, kernels, views
+        put_on = one_kernel(put_on, num_nodes, in_parts=True)
 
-        def add(stack, number):
-            return put_on(stack, *shared, *([] if number is None else [number]))
+        def of_all(ground, layers, plan, odd, kernels, view_secants):
+            shared = layers, plan.doublings, odd, kernels, view_secants
 
-        stack = over_layers(add, modes.ground(mode, mean), plan, upwards=True)
-        return top(stack).reflection()
+            def add(stack, number):
+                return put_on(stack, *shared, *([] if number is None else [number]))
+
+            return top(over_layers(add, ground, plan, upwards=True)).reflection()
+
+        # Of one layer that is the only one XLA would find no use for what tells layers apart, and
+        # what leaves towards several views is a sum that it would share among threads.
+        if plan.layers.tau.shape[0] > 1 and inputs.view_secants.shape[0] == 1:
+            of_all = one_kernel(of_all, num_nodes, in_parts=True)
+        shared = given, plan, mode.order.odd, mode.kernels(), inputs.view_secants
+        return of_all(mode.below(inputs.ground, mean), *shared)
 
     def another(total, mode, counts):
         found = reflection(False, mode)
         total = total + counts * mode.weight * found
-        return total, None, total, jnp.max(jnp.abs(found), axis=0)
+        if plan.error_budget is None:
+            return total, None, None
+        return total, None, plan.share(0.5 * total, jnp.max(jnp.abs(found), axis=0))
 
     # Without slopes a kernel for the mean alone is soon compiled, and a tenth faster than to ask in
     # each layer which mode it is.
-    every = modes.all()
+    every = inputs.every_mode()
     first = jax.tree.map(lambda x: x[0], every)
     total = first.weight * reflection(True, first)
     return over_modes(another, total, every, 1, None, plan)[0]
@@ -174,13 +168,7 @@ def _mode_sum_jvp(how, primals, tangents):
 
     def of_one(inputs, tangents):
         value, gradient = reflectance_and_gradient(inputs, given, how)
-        change = jnp.zeros_like(value)
-        pairs = zip(jax.tree.leaves(gradient), jax.tree.leaves(tangents), strict=True)
-        for slope, tangent in pairs:
-            if not isinstance(tangent, SymbolicZero):
-                axes = tuple(range(slope.ndim - value.ndim))
-                change = change + jnp.sum(slope * tangent, axis=axes)
-        return value, change
+        return value, along(gradient, tangents, value)
 
     if num_views == 1:
         value, change = of_one(inputs, tangents[0])
@@ -209,18 +197,16 @@ def _reflectance_and_gradient(inputs, plan, how):
     doublings = plan.doublings
     if doublings.most is None:
         raise TypeError("slopes need a largest number of doublings.")
-    modes = _Modes(inputs, plan)
+    layers, num_nodes = plan.layers.as_layers(), inputs.num_nodes
     faces = None
     if plan.groups is not None:
-        num_layers, num_rows = modes.layers.tau.shape[0], 3 + 2 * modes.num_nodes
-        faces = jnp.zeros(
-            (num_layers + 1, num_rows, *modes.layers.tau.shape[1:]), modes.layers.tau.dtype
-        )
-    shared = Shared(modes.layers, inputs.view_secants[0], faces)
+        num_layers, *batch = layers.tau.shape
+        faces = jnp.zeros((num_layers + 1, 3 + 2 * num_nodes, *batch), layers.tau.dtype)
+    shared = Shared(layers, inputs.view_secants[0], faces)
 
     def one(carry, mode, counts):
         value, slopes, of_mean, room = carry
-        kernels, ground = _kernels(mode.nodes, mode.beams), modes.ground(mode)
+        kernels, ground = mode.kernels(), mode.below(inputs.ground)
         weight = counts * mode.weight[0]
         reflection, room, found = mode_slopes(
             shared, plan, how.single_scattering, mode.order, kernels, ground, weight, slopes, room
@@ -230,20 +216,24 @@ def _reflectance_and_gradient(inputs, plan, how):
             of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, found.ground)
         own = None if inputs.grounds is None else found.ground
         value = value + weight * reflection
-        # The mean is never the last by chance.
-        size = jnp.where(mode.order.mean > 0, jnp.full_like(value, jnp.inf), jnp.abs(reflection))
         row = counts * reflection[None], (found.even_beams, found.odd_beams), own
-        return (value, found.shared, of_mean, room), row, value, size
+        carry = value, found.shared, of_mean, room
+        if plan.error_budget is None:
+            return carry, row, None
+        of_slopes = plan.share_of_slopes(found.square, found.shared.layers.tau)
+        share = jnp.maximum(of_slopes, plan.share(0.5 * value[None], jnp.abs(reflection)))
+        # The mean is never the last by chance.
+        return carry, row, jnp.where(mode.order.mean > 0, jnp.full_like(share, jnp.inf), share)
 
     nothing = jax.tree.map(jnp.zeros_like, (shared.view_secant, shared, inputs.ground))
-    keep = shared.layers.tau, modes.num_nodes, doublings.most, faces is not None
+    keep = layers.tau, num_nodes, doublings.most, faces is not None
     space = Keeper(*keep).empty()
-    every = modes.all()
+    every = inputs.every_mode()
     rows = inputs.weights, inputs.beams, every.ground
     carry, rows = over_modes(one, (*nothing, space), every, 0, rows, plan)
     (value, slopes, of_mean, _), (reflections, beams, of_grounds) = carry, rows
     if of_grounds is not None:
-        of_mean, of_grounds = (jax.tree.map(lambda x, i=i: x[i], of_grounds) for i in (0, _LATER))
+        of_mean, of_grounds = (jax.tree.map(lambda x, i=i: x[i], of_grounds) for i in (0, LATER))
     summed = slopes.layers
     even, odd = summed.moments.reshape(2, -1, *summed.moments.shape[1:])
     found = LayersOfModes(summed.tau, summed.coalbedo, summed.sun_secant, (even, odd))
@@ -269,58 +259,3 @@ def _second_derivative(how, primals, tangents):
         return _reflectance_and_gradient(inputs, everything(inputs.layers, doublings), how)
 
     return jax.jvp(written_out, (inputs,), tangents[:1])
-
-
-class _Mode(NamedTuple):
-    """Of one mode; its ground is None where modes but the first see a black one."""
-
-    order: Order
-    weight: Float[Array, "view *batch"]
-    ground: Bordered | None
-    nodes: tuple[Array, Array]
-    beams: tuple[Array, Array]
-
-
-class _Modes:
-    """The inputs as the modes see them, with the layers that are solved."""
-
-    def __init__(self, inputs: ModeSum, plan: Plan):
-        tau, coalbedo, sun_secants, (even, odd) = plan.layers
-        self.inputs = inputs
-        self.layers = Layers(tau, coalbedo, sun_secants, jnp.concatenate([even, odd]))
-        self.num_nodes = even.shape[1]
-        self.num_streams = 2 * self.num_nodes
-        self.num_modes = inputs.weights.shape[0]
-        functions = node_functions(self.num_streams, self.num_modes)
-        self.nodes = self._nodes(functions, 0), self._nodes(functions, 1)
-
-    def _nodes(self, functions: np.ndarray, parity: int) -> Array:
-        """Functions at the nodes of the degrees of one parity of l + m, all modes."""
-        rows = [functions[m, (m + parity) % 2 :: 2].T for m in range(self.num_modes)]
-        return jnp.asarray(np.stack(rows), self.layers.tau.dtype)
-
-    def all(self) -> _Mode:
-        """What differs from mode to mode, on the first axis."""
-        x = self.inputs
-        number = jnp.arange(self.num_modes, dtype=self.layers.tau.dtype)
-        order = Order(number % 2, (number == 0).astype(number.dtype))
-        grounds = x.grounds
-        if grounds is not None:
-            grounds = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), x.ground, grounds)
-        return _Mode(order, x.weights, grounds, self.nodes, x.beams)
-
-    def ground(self, mode: _Mode, mean: bool | None = None) -> Bordered:
-        """Ground of a mode; `mean` tells whether it is the mean, where that is known."""
-        if mode.ground is not None:
-            return mode.ground
-        of_mean = self.inputs.ground
-        nothing = black(jnp.ones_like(of_mean.diagonal), self.num_streams)
-        if mean is not None:
-            return of_mean if mean else nothing
-        is_mean = mode.order.mean > 0
-        return jax.tree.map(lambda x, y: jnp.where(is_mean, x, y), of_mean, nothing)
-
-
-def _kernels(nodes, beams) -> Kernels:
-    a, b = (mode_kernels(n, v) for n, v in zip(nodes, beams, strict=True))
-    return a, b

@@ -61,13 +61,23 @@ def legendre_tables(
 ) -> LegendreTables:
     """Evaluate the functions of all modes at the nodes, and at the beams over their cosines."""
     at_nodes = node_functions(num_streams, num_modes)
-    at_beams = associated_legendre(num_modes, num_streams, cosines) / cosines
-    nodes, beams = [], []
-    for parity in (0, 1):
-        rows = [(m, slice((m + parity) % 2, None, 2)) for m in range(num_modes)]
-        nodes.append(jnp.stack([jnp.asarray(at_nodes[m, d].T, cosines.dtype) for m, d in rows]))
-        beams.append(jnp.swapaxes(jnp.stack([at_beams[m, d] for m, d in rows]), 1, 2))
-    return LegendreTables(tuple(nodes), tuple(beams))
+    of_parity = [
+        [(m, slice((m + parity) % 2, None, 2)) for m in range(num_modes)] for parity in (0, 1)
+    ]
+
+    def at_beams(cosines: Array) -> tuple[Array, ...]:
+        found = associated_legendre(num_modes, num_streams, cosines) / cosines
+        return tuple(
+            jnp.swapaxes(jnp.stack([found[m, d] for m, d in rows]), 1, 2) for rows in of_parity
+        )
+
+    even, odd = (
+        jnp.stack([jnp.asarray(at_nodes[m, d].T, cosines.dtype) for m, d in rows])
+        for rows in of_parity
+    )
+    # A loop over degrees of which each kernel takes less than its start.
+    beams = one_kernel(at_beams, 1)(cosines)
+    return LegendreTables((even, odd), beams)
 
 
 def weighted_moments(layers: ScaledLayers) -> Float[Array, "parity layer degree *batch"]:

@@ -45,8 +45,13 @@ def delta_m(
     """
     f = moments[:, num_streams]
     rest = 1 - ssa * f
-    scaled = (moments[:, :num_streams] - f[:, None]) / (1 - f[:, None])
-    return ScaledLayers(rest * tau, ssa * (1 - f) / rest, (1 - ssa) / rest, scaled, ssa / rest)
+    # A quotient takes as long as ten products.
+    ratio, per_rest = 1 / (1 - f[:, None]), 1 / rest
+    scaled = (moments[:, :num_streams] - f[:, None]) * ratio
+    scattering_ratio = ssa * per_rest
+    return ScaledLayers(
+        rest * tau, (1 - f) * scattering_ratio, (1 - ssa) * per_rest, scaled, scattering_ratio
+    )
 
 
 def unscaled(

@@ -5,6 +5,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._numerics import safe_sqrt
+from ...machine.algebra import fenced
+from ...machine.kernels import one_kernel
+from .mode_layers import read
+
+_THIN, _TERMS = 0.05, 8  # 1 - exp(-x) by so many terms of its series is right to rounding below
 
 
 def cos_scattering_angle(
@@ -54,6 +59,45 @@ def exact_single_scattering(
        thick atmospheres using a truncation approximation", J. Quant. Spectrosc. Radiat. Transfer,
        40, 51-69, 1988, doi:10.1016/0022-4073(88)90031-3
     """
+    return _scattered_once(tau, scattering_ratio, phase_function, mu0, mu, sun_secants)
+
+
+@jax.custom_jvp
+def _scattered_once(*arguments):
+    """From the top down, with one exponential function a layer: faster than `_summed`."""
+    return one_kernel(_from_the_top, 1)(*arguments)
+
+
+def _from_the_top(tau, scattering_ratio, phase_function, mu0, mu, sun_secants):
+    def one(k, state):
+        total, above = state
+        secant = 1 / mu + read(sun_secants, k)
+        x = secant * read(tau, k)
+        through = jnp.exp(-x)
+        own = read(scattering_ratio, k) * read(phase_function, k) / secant
+        return total + above * own * _lost(x, through), above * through
+
+    start = jnp.zeros_like(mu * mu0), jnp.ones_like(mu * mu0)
+    total, _ = jax.lax.fori_loop(0, tau.shape[0], one, start)
+    return total / (4 * mu * mu0)
+
+
+@_scattered_once.defjvp
+def _scattered_once_jvp(primals, tangents):
+    # Else it would be computed column by column, where a result is turned to have the batch first.
+    return jax.jvp(fenced(_summed), primals, tangents)
+
+
+def _lost(x, through):
+    """1 - exp(-x) from exp(-x), by its series where a difference would lose digits."""
+    series = jnp.ones_like(x)
+    for k in range(_TERMS, 1, -1):
+        series = 1 - x / k * series
+    return jnp.where(x < _THIN, x * series, 1 - through)
+
+
+def _summed(tau, scattering_ratio, phase_function, mu0, mu, sun_secants):
+    """The same in whole arrays, whose derivatives JAX takes."""
     secant = 1 / mu + sun_secants[:, None]
     slant = secant * tau[:, None]
     # Summed without the layer itself: taking a thick layer out again would cost its digits. Not by

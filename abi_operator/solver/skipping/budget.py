@@ -1,11 +1,13 @@
 r"""The error budget: what of it each way of skipping may spend.
 
 A budget b is a relative error of the reflectance that may be made on top of what the streams leave:
-of max(brf, `LEAST_BRF`), in 99 of 100 columns. Layers are merged until b times `OF_MERGING` is
-estimated to be lost at a group of them (`grouping`), a column's azimuth modes end where they count
-less than b times `OF_MODES` (`mode_sum`), and a layer's doublings leave b times `OF_DOUBLINGS` of
-its own response (`doublings`). These shares were fitted on columns of other seeds than those that
-`benchmarks/skipping.py` judges them by.
+of max(brf, `LEAST_BRF`), in 99 of 100 columns. Of columns that emit it is one of the radiance, or
+of that which `LEAST_BRF` would have, where it is less. Layers are merged until b times
+`OF_MERGING` is estimated to be lost at a group of them (`grouping`). A column's azimuth modes end
+where they count less than b times `OF_MODES`, and those but the mean are left out that are
+expected to be less than b times `OF_NO_MODES` (`mode_sum`). A layer's doublings leave b times
+`OF_DOUBLINGS` of its own response (`doublings`). These shares were fitted on columns of other
+seeds than those that `benchmarks/skipping.py` judges them by.
 
 Groups and modes are each column's own. Of doublings a layer has as many as that column of its tile
 asks for that needs most: what a column gets depends on those that it is solved with by about a
@@ -21,11 +23,19 @@ from jaxtyping import Array, Float
 LEAST_BRF = 0.01
 """Smallest reflectance that an error is compared with. [-]"""
 OF_MERGING = 0.5
-"""Share of the budget that one group of merged layers may be estimated to lose."""
-OF_MODES = 1.0
+"""Share of the budget that a group of merged layers may be estimated to lose, and to misplace of
+thermal light that it scatters."""
+OF_MODES = 0.5
 """Share of the budget below which an azimuth mode is the last one."""
 OF_DOUBLINGS = 0.2
 """Share of the budget that a layer's response may be off by."""
+OF_DOUBLINGS_WARM = 2e-4
+"""The same of layers that emit, whose light may be that of a cold top over a hot ground."""
+OF_MODES_OF_SLOPES = 3e-4
+"""Share of a column's slopes below which those of an azimuth mode in the moments are the last. Such
+of a high degree are much the same in every mode, and many small ones add up to 1 %."""
+OF_NO_MODES = 0.1
+"""Share of the budget below which all modes but the mean are expected to stay."""
 DECAY = 0.15
 """Ratio of neighbouring modes' sizes, to see a small one by chance for what it is."""
 OF_SLOPES = 2e-3
@@ -35,26 +45,39 @@ THICKEST = 2.0
 
 
 class Expected(NamedTuple):
-    """What is known of the reflectance of columns before they are solved; without derivatives.
+    """What is known of the light of columns before they are solved; without derivatives.
+
+    Light is a reflectance, or a radiance of columns that emit, and so is all here.
 
     Parameters
     ----------
     added
-        Part of it that is added exactly to that of the modes, for each view. [-]
+        Part of it that is added exactly to that of the modes, for each view.
     least
-        A careful estimate of all of it, for the view that sees least. [-]
+        A careful estimate of all of it, for the view that sees least.
+    dark
+        What a reflectance of `LEAST_BRF` is.
+    aside
+        A generous estimate of what any mode but the mean may add to it.
+    through
+        Share of the beam that meets nothing on its way to the ground and back: at least the slope
+        in the albedo of a Lambertian ground. [-]
     """
 
     added: Float[Array, "view *batch"]
     least: Float[Array, "*batch"]
+    dark: Float[Array, "*batch"]
+    aside: Float[Array, "*batch"]
+    through: Float[Array, "*batch"]
 
 
 def expected(
     added: Float[Array, "view *batch"],
-    ground: Float[Array, "view *batch"],
+    ground: Float[Array, "view *batch"] | None,
     tau: Float[Array, "layer *batch"],
     coalbedo: Float[Array, "layer *batch"],
     backward: Float[Array, "layer *batch"],
+    cosines: Float[Array, "beam *batch"],
 ) -> Expected:
     r"""Estimate the reflectance of a column from what is scattered once and diffused.
 
@@ -62,18 +85,32 @@ def expected(
        t = \tfrac34\sum\omega(1-g)\tau, \quad a = \sum(1-\omega)\tau,
 
     half of what a conservative atmosphere of that depth would send back, less what absorbs: seldom
-    more than the reflectance, so that what is allowed as a share of it is seldom too much.
+    more than the reflectance, so that what is allowed as a share of it is seldom too much. Light
+    that is scattered twice is to all modes together about
+
+    .. math:: \frac{S^2}{\mu_0\mu}, \qquad S = \frac{\sum\omega\tau}{1 + \sum\omega\tau},
+
+    four times what two thin layers would send to one another if they scattered isotropically, as
+    much of it travels along them.
 
     Parameters
     ----------
     added, ground
-        Light scattered once, and sent back by the ground alone. [-]
+        Light scattered once, and sent back by the ground alone; None of a ground that sends
+        light to the modes, which is part of `added`. [-]
     tau, coalbedo, backward
         Layers' optical depth, 1 - ssa, and ssa (1 - g). [-]
+    cosines
+        Of the sun's zenith angle and of the views'. [-]
     """
     t = 0.75 * jnp.sum(backward * tau, axis=0)
     absorbed = jnp.sum(coalbedo * tau, axis=0)
+    scattered = jnp.sum(tau, axis=0) - absorbed
     diffused = 0.5 * t / ((1 + t) * (1 + absorbed))
-    least = jnp.maximum(LEAST_BRF, jnp.min(added + ground, axis=0) + diffused)
-    added, least = jax.lax.stop_gradient((added, least))
-    return Expected(added, least)
+    seen = added if ground is None else added + ground
+    least = jnp.maximum(LEAST_BRF, jnp.min(seen, axis=0) + diffused)
+    twice = (scattered / (1 + scattered)) ** 2 / (cosines[0] * jnp.min(cosines[1:], axis=0))
+    aside = jnp.full_like(twice, jnp.inf) if ground is None else twice
+    through = jnp.exp(-(1 / cosines[0] + 1 / cosines[1]) * jnp.sum(tau, axis=0))
+    known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside, through)
+    return jax.lax.stop_gradient(known)

@@ -11,7 +11,8 @@ by the number of their groups and, among equals, by that of their modes,
 as if light scattered twice, of which there is S^2 s, lost the same share of itself from mode to
 mode until it counts less than the budget b times the reflectance R; s is the sum of the secants.
 Every other number of groups begins with the columns of most modes, so that a tile of two numbers
-has columns that are alike in their modes. The order only costs time where it is wrong.
+has columns that are alike in their modes. The order only costs time where it is wrong, and with few
+streams (`SORTED_FROM`) it costs more than it saves.
 """
 
 import jax
@@ -19,16 +20,17 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from . import budget
-from .grouping import group_labels
+from .grouping import Alike, Limits, group_labels
 
+SORTED_FROM = 6
+"""Streams from which columns are put in order (``benchmarks/skipping.py --streams`` has rows with
+and without)."""
 _STRAIGHT = 1e-6  # product of the tangents of half the zenith angles, which is 0 for either at 0
 
 
 def need(
-    tau: Float[Array, "layer *batch"],
-    scattered: Float[Array, "layer *batch"],
-    forward: Float[Array, "layer *batch"],
-    albedo: Float[Array, "*batch"],
+    alike: Alike,
+    known: budget.Expected,
     mu0: Float[Array, "*batch"],
     mu: Float[Array, "*batch"],
     error_budget: float,
@@ -37,26 +39,21 @@ def need(
 
     Parameters
     ----------
-    tau, scattered, forward
-        Optical depth, omega and omega g of each layer as it is solved. [-]
-    albedo
-        Of the ground. [-]
+    alike, known
+        Layers, and what is known of the light.
     mu0, mu
         Cosines of the sun's and the view's zenith angle. [-]
     error_budget
         As in `plan.planned`.
     """
-    tau, scattered, forward, albedo, mu0, mu = jax.lax.stop_gradient(
-        (tau, scattered, forward, albedo, mu0, mu)
-    )
+    alike, known, mu0, mu = jax.lax.stop_gradient((alike, known, mu0, mu))
     secants = 1 / mu0 + 1 / mu
-    ground = albedo * jnp.exp(-secants * jnp.sum(tau, axis=0))
-    nothing = jnp.zeros_like(mu)[None]
-    known = budget.expected(nothing, ground[None], tau, 1 - scattered, scattered - forward)
     allowed = budget.OF_MERGING * error_budget * known.least
-    labels = group_labels(tau, scattered, forward, 0.5 * secants, allowed, float("inf"))
-    depth = jnp.sum(scattered * tau, axis=0)
+    labels = group_labels(alike, Limits(0.5 * secants, allowed, float("inf")))
+    depth = jnp.sum(alike.scattered * alike.tau, axis=0)
     twice = (depth / (1 + depth)) ** 2 * secants / (error_budget * known.least)
+    if alike.sun is not None:
+        twice = alike.sun * twice
     tangents = jnp.sqrt((1 - mu0) / (1 + mu0) * (1 - mu) / (1 + mu))
     modes = jnp.log(jnp.maximum(twice, 1)) / -jnp.log(jnp.clip(tangents, _STRAIGHT, 1 - _STRAIGHT))
     share = modes / (1 + modes)

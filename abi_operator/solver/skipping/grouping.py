@@ -11,6 +11,14 @@ the first moment of what differs, with rational functions in place of exponentia
 each layer joins the group above it while the sum of this over the group's members, seen through
 what lies above (1 / (1 + `ATTENUATION` times its backward depth)), stays below what the error
 budget allows; else it starts a new group.
+
+A group emits as if its Planck function were linear in optical depth (`heat`). Its light is off by
+less than a quarter of the range D of the Planck function in it, of which that part counts that any
+layer scatters, those of all the column having the scattering depth S:
+
+.. math:: \frac{D}{4}\,\frac{sT}{1+sT}\,\frac{sS}{1+sS},
+
+which each group may do once.
 """
 
 from typing import NamedTuple
@@ -25,6 +33,7 @@ ATTENUATION = 0.25
 """How the depth above, times 1 - g, hides what is below. [-]"""
 LEAST_SECANT = 2.0
 """Of light that has been scattered more than once, at least. [-]"""
+_OFF = 0.25  # largest distance of a curve from its chord, over its range, of what bends evenly
 
 
 class Groups(NamedTuple):
@@ -46,55 +55,67 @@ class Groups(NamedTuple):
     number: Float[Array, ""]
 
 
-def grouped(
-    tau: Float[Array, "layer *batch"],
-    scattered: Float[Array, "layer *batch"],
-    forward: Float[Array, "layer *batch"],
-    secant: Float[Array, "*batch"],
-    allowed: Float[Array, "*batch"],
-    thickest: float,
-) -> Groups:
-    """Groups of a tile's layers, as above.
+class Alike(NamedTuple):
+    """By what layers are alike.
 
     Parameters
     ----------
     tau, scattered, forward
         Optical depth, omega and omega g of each layer as it is solved. [-]
+    planck, sun
+        Of columns that emit, the Planck function at the upper face of each layer and at the ground,
+        and the radiance of a reflectance of 1; else None. [radiance unit]
+    """
+
+    tau: Float[Array, "layer *batch"]
+    scattered: Float[Array, "layer *batch"]
+    forward: Float[Array, "layer *batch"]
+    planck: Float[Array, "level *batch"] | None = None
+    sun: Float[Array, "*batch"] | None = None
+
+
+class Limits(NamedTuple):
+    """What a group may be.
+
+    Parameters
+    ----------
     secant
         Mean secant of sun and view. [-]
     allowed
-        What a group may lose, of the reflectance. [-]
+        What it may lose, of the reflectance or the radiance.
     thickest
-        Optical depth on the way down and up that no group exceeds, but a layer alone. [-]
+        Optical depth on the way down and up that it does not exceed, but a layer alone. [-]
     """
-    arguments = _without_slopes(tau, scattered, forward, secant, allowed, thickest)
-    labels = one_kernel(_labels, 1)(*arguments)
+
+    secant: Float[Array, "*batch"]
+    allowed: Float[Array, "*batch"]
+    thickest: float
+
+
+def grouped(alike: Alike, limits: Limits) -> Groups:
+    """Groups of a tile's layers, as above."""
+    labels = group_labels(alike, limits)
     axes = tuple(range(1, labels.ndim))
     first, last = jnp.min(labels, axis=axes), jnp.max(labels, axis=axes)
     return Groups(labels, first, last, last[-1] + 1)
 
 
-def group_labels(
-    tau: Float[Array, "layer *batch"],
-    scattered: Float[Array, "layer *batch"],
-    forward: Float[Array, "layer *batch"],
-    secant: Float[Array, "*batch"],
-    allowed: Float[Array, "*batch"],
-    thickest: float,
-) -> Float[Array, "layer *batch"]:
-    """Number of each layer's group, of any number of columns; arguments as in `grouped`."""
-    return _labels(*_without_slopes(tau, scattered, forward, secant, allowed, thickest))
+def group_labels(alike: Alike, limits: Limits) -> Float[Array, "layer *batch"]:
+    """Number of each layer's group."""
+    return one_kernel(_labels, 1)(*_without_slopes(alike, limits))
 
 
-def _without_slopes(tau, scattered, forward, secant, allowed, thickest):
-    slant = 2 * jnp.maximum(secant, LEAST_SECANT / 2)
-    return jax.lax.stop_gradient(
-        (tau, scattered, forward, slant, allowed, jnp.full_like(slant, thickest))
-    )
+def _without_slopes(alike: Alike, limits: Limits):
+    slant = 2 * jnp.maximum(limits.secant, LEAST_SECANT / 2)
+    thickest = jnp.full_like(slant, limits.thickest)
+    depth = slant * jnp.sum(alike.scattered * alike.tau, axis=0)
+    turned = depth / (1 + depth)  # share of light on its way that is scattered
+    return jax.lax.stop_gradient((alike, slant, limits.allowed, thickest, turned))
 
 
 class _Group(NamedTuple):
-    """The group that layers join: sums over its members, what it has lost, what lies above."""
+    """The group that layers join: sums over its members, what it has lost, what lies above; and of
+    those that emit the Planck function at its upper face, and how far from it that is anywhere."""
 
     tau: Array
     scattered: Array
@@ -102,18 +123,29 @@ class _Group(NamedTuple):
     lost: Array
     above: Array
     label: Array
+    planck: Array | None
+    span: Array | None
 
 
-def _labels(tau, scattered, forward, slant, allowed, thickest):
+def _labels(alike: Alike, slant, allowed, thickest, turned):
     def step(group: _Group, layer):
-        t, w, f = layer
-        own = jnp.where(group.tau > 0, group.tau, 1)
+        t, w, f, faces = layer
         depth, total = group.tau, group.tau + t
-        difference = jnp.abs(group.scattered / own - w) + jnp.abs(group.forward / own - f)
-        loss = 0.5 * difference * slant * depth / (1 + slant * depth)
-        loss = loss * slant * t / (1 + slant * total) / (1 + ATTENUATION * group.above)
+        # Differences of omega and omega g, times T: one quotient in all, as they take long.
+        difference = jnp.abs(group.scattered - w * depth) + jnp.abs(group.forward - f * depth)
+        hidden = (1 + slant * depth) * (1 + slant * total) * (1 + ATTENUATION * group.above)
+        loss = 0.5 * difference * slant * slant * t / hidden
+        if alike.sun is not None:
+            loss = alike.sun * loss
         lost = group.lost + loss
         new = (lost > allowed) | ((slant * total > thickest) & (depth > 0))
+        span, start, own_span = None, None, None
+        if faces is not None:
+            assert group.planck is not None and group.span is not None
+            upper, lower = faces
+            span = jnp.maximum(group.span, jnp.abs(lower - group.planck))
+            new = new | (_OFF * span * turned * slant * total / (1 + slant * total) > allowed)
+            start, own_span = upper, jnp.abs(lower - upper)
         joined = _Group(
             total,
             group.scattered + w * t,
@@ -121,13 +153,20 @@ def _labels(tau, scattered, forward, slant, allowed, thickest):
             lost,
             group.above,
             group.label,
+            group.planck,
+            span,
         )
         backward = jnp.maximum(depth - group.forward, 0)
-        fresh = _Group(t, w * t, f * t, 0 * t, group.above + backward, group.label + 1)
+        above = group.above + backward
+        fresh = _Group(t, w * t, f * t, 0 * t, above, group.label + 1, start, own_span)
         group = jax.tree.map(lambda x, y: jnp.where(new, x, y), fresh, joined)
         return group, group.label
 
-    t, w, f = tau[0], scattered[0], forward[0]
-    start = _Group(t, w * t, f * t, 0 * t, 0 * t, 0 * t)
-    _, labels = jax.lax.scan(step, start, (tau[1:], scattered[1:], forward[1:]))
+    tau, planck = alike.tau, alike.planck
+    t, w, f = tau[0], alike.scattered[0], alike.forward[0]
+    faces = None if planck is None else (planck[1:-1], planck[2:])
+    warmth = (None, None) if planck is None else (planck[0], jnp.abs(planck[1] - planck[0]))
+    start = _Group(t, w * t, f * t, 0 * t, 0 * t, 0 * t, *warmth)
+    layers = tau[1:], alike.scattered[1:], alike.forward[1:], faces
+    _, labels = jax.lax.scan(step, start, layers)
     return jnp.concatenate([start.label[None], labels])

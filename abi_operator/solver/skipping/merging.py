@@ -61,6 +61,23 @@ def _merged(groups: Groups, tau, rows):
     return depth, jax.lax.fori_loop(0, groups.number.astype(jnp.int32), mean, weighted)
 
 
+def summed(groups: Groups, x: Float[Array, "layer *batch"]) -> Float[Array, "layer *batch"]:
+    """Sum over the members of each group, in the places of the first layers."""
+    return one_kernel(_summed, 1)(groups, x)
+
+
+def _summed(groups: Groups, x):
+    def add(layer, sums):
+        own, label = read(x, layer), read(groups.labels, layer)
+
+        def put(k, sums):
+            return added_to(sums, k, jnp.where(label == k.astype(label.dtype), own, 0))
+
+        return _for_groups_of(groups, layer, put, sums)
+
+    return jax.lax.fori_loop(0, x.shape[0], add, jnp.zeros_like(x))
+
+
 class Solved(NamedTuple):
     """Groups as they were solved, and slopes in them.
 

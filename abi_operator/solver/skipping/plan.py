@@ -9,10 +9,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..method.doublings import Doublings, layer_doublings
-from ..method.mode_layers import read
+from ..method.mode_layers import Layers, read
 from . import budget
 from .budget import Expected
-from .grouping import Groups, grouped
+from .grouping import Alike, Groups, Limits, grouped
+from .heat import Warm
 from .merging import Solved, handed_back, merged
 
 
@@ -37,6 +38,11 @@ class LayersOfModes(NamedTuple):
         single = jnp.stack([self.coalbedo, self.sun_secants], axis=1)
         return jnp.concatenate([single, *self.moments], axis=1)
 
+    def as_layers(self) -> Layers:
+        """The same as the modes read them, one by one."""
+        tau, coalbedo, sun_secants, moments = self
+        return Layers(tau, coalbedo, sun_secants, jnp.concatenate(moments))
+
     def of_rows(self, tau: Array, rows: Float[Array, "layer row *batch"]) -> "LayersOfModes":
         """Layers, or slopes in them, from a thickness and such an array."""
         end = 2 + self.moments[0].shape[1]
@@ -54,9 +60,9 @@ class Plan(eqx.Module):
         Of each group.
     given, groups
         The layers given, and which group each belongs to; None where each is solved by itself.
-    known, allowed
-        Of the reflectance beside the modes', and the share of it that a mode may count for and yet
-        be the last one; None where all modes are solved.
+    known, error_budget
+        Of the light beside the modes', and the relative error of it that may be made; None where
+        all modes are solved.
     """
 
     layers: LayersOfModes
@@ -64,7 +70,7 @@ class Plan(eqx.Module):
     given: LayersOfModes
     groups: Groups | None
     known: Expected | None
-    allowed: float | None = eqx.field(static=True)
+    error_budget: float | None = eqx.field(static=True)
 
     @property
     def num_groups(self) -> Any:
@@ -82,13 +88,27 @@ class Plan(eqx.Module):
         tau, rows = handed_back(self.groups, self.given.tau, self.given.rows(), groups)
         return found.of_rows(tau, rows)
 
-    def wanting(
-        self, total: Float[Array, "*view batch"], size: Float[Array, "batch"]
-    ) -> Bool[Array, "batch"]:
-        """Which columns need more modes after one of this size and such a sum of them."""
-        assert self.known is not None and self.allowed is not None
-        brf = jnp.maximum(jnp.abs(0.5 * total + self.known.added), budget.LEAST_BRF)
-        return jnp.any(size > self.allowed * brf, axis=0)
+    def beyond_the_mean(self) -> Bool[Array, "batch"]:
+        """Which columns need any mode but the mean, as far as is known before."""
+        assert self.known is not None and self.error_budget is not None
+        return self.known.aside > budget.OF_NO_MODES * self.error_budget * self.known.least
+
+    def share(
+        self, light: Float[Array, "*view batch"], size: Float[Array, "batch"]
+    ) -> Float[Array, "batch"]:
+        """How much of what it may be a mode's part of the light is, from the light of the modes so
+        far."""
+        assert self.known is not None and self.error_budget is not None
+        light = jnp.maximum(jnp.abs(light + self.known.added), self.known.dark)
+        return jnp.max(size / (budget.OF_MODES * self.error_budget * light), axis=0)
+
+    def share_of_slopes(
+        self, square: Float[Array, "batch"], tau_slopes: Float[Array, "layer batch"]
+    ) -> Float[Array, "batch"]:
+        """The same of its slopes in moments, from the sum of their squares and slopes in tau."""
+        assert self.known is not None
+        norm = jnp.sum(tau_slopes**2, axis=0) + self.known.through**2
+        return jnp.sqrt(square / norm) / budget.OF_MODES_OF_SLOPES
 
 
 def everything(layers: LayersOfModes, doublings: Doublings) -> Plan:
@@ -103,6 +123,7 @@ def planned(
     error_budget: float,
     most: int | None,
     thickest: float = float("inf"),
+    warm: Warm | None = None,
 ) -> Plan:
     """What an error budget asks for.
 
@@ -111,30 +132,33 @@ def planned(
     layers, view_secants
         Of a tile.
     known
-        Of the reflectance of its columns.
+        Of the light of its columns.
     error_budget
         Relative error of the reflectance that may be made (`budget`).
     most
         Doublings of a layer, at most; None for no limit.
     thickest
         Optical depth on the way down and up that no group exceeds. [-]
+    warm
+        What is known of columns that emit.
     """
     given, groups = layers, None
     if layers.tau.shape[0] > 1:
         secant = 0.5 * (layers.sun_secants[0] + jnp.max(view_secants, axis=0))
         allowed = budget.OF_MERGING * error_budget * known.least
         forward = layers.moments[1][:, 0] / 3
-        groups = grouped(layers.tau, 1 - layers.coalbedo, forward, secant, allowed, thickest)
+        alike = Alike(layers.tau, 1 - layers.coalbedo, forward)
+        if warm is not None:
+            alike = alike._replace(planck=warm.planck, sun=warm.sun)
+        groups = grouped(alike, Limits(secant, allowed, thickest))
         tau, rows = merged(groups, layers.tau, layers.rows())
         layers = layers.of_rows(tau, rows)
     views = jnp.broadcast_to(view_secants[:, None], (len(view_secants), *layers.tau.shape))
     secants = jnp.concatenate([layers.sun_secants[None], views])
     num_streams = 2 * layers.moments[0].shape[1]
-    doublings = layer_doublings(
-        layers.tau, secants, num_streams, most, budget.OF_DOUBLINGS * error_budget
-    )
-    allowed_of_modes = budget.OF_MODES * error_budget
-    return Plan(layers, doublings, given, groups, known, allowed_of_modes)
+    share = budget.OF_DOUBLINGS if warm is None else budget.OF_DOUBLINGS_WARM
+    doublings = layer_doublings(layers.tau, secants, num_streams, most, share * error_budget)
+    return Plan(layers, doublings, given, groups, known, error_budget)
 
 
 def over_layers(
@@ -161,23 +185,24 @@ def over_layers(
 
 
 def over_modes(
-    body: Callable[[Any, Any, Any], tuple[Any, Any, Any, Any]],
+    body: Callable[[Any, Any, Any], tuple[Any, Any, Any]],
     carry: Any,
     modes: Any,
     start: int,
     rows: Any,
     plan: Plan,
 ) -> tuple[Any, Any]:
-    """``carry, row, total, size = body(carry, mode, counts)`` for the modes that count.
+    """``carry, row, share = body(carry, mode, counts)`` for the modes that count.
 
-    A tile ends with the last column that needs a mode. In the others it counts for nothing: what a
-    column gets does not depend on those that it is solved with.
+    Where the mean is one of them it is the first, and counts. A tile ends with the last column that
+    needs a mode. In the others it counts for nothing: what a column gets does not depend on those
+    that it is solved with.
 
     Parameters
     ----------
     body
-        Of one mode; gives its row of the results, the sum of the modes so far, and how large a part
-        of it this mode may be at any azimuth. `counts` is 1 in columns that need it, else 0.
+        Of one mode; gives its row of the results, and how much of what it may be to be the last one
+        its part of them is. `counts` is 1 in columns that need it, else 0.
     carry
         What goes from mode to mode.
     modes
@@ -190,12 +215,14 @@ def over_modes(
         Whether all are solved, or until they are small.
     """
     num_modes = jax.tree.leaves(modes)[0].shape[0]
-    if plan.allowed is None:
+    if plan.error_budget is None:
         rest = jax.tree.map(lambda x: x[start:], modes)
         carry, found = jax.lax.scan(lambda c, mode: body(c, mode, 1.0)[:2], carry, rest)
         return carry, found
     tau = plan.layers.tau[0]
     before = jnp.full_like(tau, jnp.inf)
+    beyond = plan.beyond_the_mean()
+    counts = jnp.where(beyond | (start == 0), jnp.ones_like(tau), 0)
 
     def unsettled(state):
         m, *_, counts = state
@@ -204,15 +231,15 @@ def over_modes(
     def one(state):
         m, carry, rows, before, counts = state
         mode = jax.tree.map(lambda x: read(x, m), modes)
-        carry, row, total, size = body(carry, mode, counts)
+        carry, row, share = body(carry, mode, counts)
         rows = jax.tree.map(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
-        wanting = plan.wanting(total, jnp.maximum(size, budget.DECAY * before))
-        return m + 1, carry, rows, size, jnp.where(wanting, counts, 0)
+        wanting = jnp.maximum(share, budget.DECAY * before) > 1
+        return m + 1, carry, rows, share, jnp.where(wanting & beyond, counts, 0)
 
     rows = jax.tree.map(jnp.zeros_like, rows)
     _, carry, rows, _, _ = jax.lax.while_loop(
-        unsettled, one, (jnp.int32(start), carry, rows, before, jnp.ones_like(tau))
+        unsettled, one, (jnp.int32(start), carry, rows, before, counts)
     )
     return carry, jax.tree.map(lambda x: x[start:], rows)

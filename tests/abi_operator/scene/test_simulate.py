@@ -251,3 +251,22 @@ def test_blocks_of_rows_cover_a_scene():
     assert row_blocks((5, 10), 20) == [slice(0, 2), slice(2, 4), slice(4, 5)]
     assert row_blocks((2, 10), 5) == [slice(0, 1), slice(1, 2)]
     assert row_blocks((2, 10), 1000) == [slice(0, 2)]
+
+
+def test_a_low_sun_shines_through_a_sphere_and_the_result_says_so(made):
+    """One column has the sun at 75 degrees: the others, in its company, stay as they were."""
+    made["solar_zenith_angle"][:] = 50.0
+    assert not column_states(made, ("C01",)).geometry.spherical
+    made["solar_zenith_angle"][1, 1] = 75.0
+    sphere = simulate(made, **OPTIONS)
+    flat = simulate(made.assign_attrs(sun_path="flat"), **OPTIONS)
+    assert (sphere.attrs["sun_path"], flat.attrs["sun_path"]) == ("spherical", "flat")
+    gain = (sphere["brf"] / flat["brf"] - 1).sel(band="C01").values
+    assert 3e-3 < gain[1, 1] < 1e-2
+    gain[1, 1] = 0
+    np.testing.assert_allclose(gain, 0, atol=ROUNDING)
+    for result, spherical in ((sphere, True), (flat, False), (flat.drop_attrs(), False)):
+        assert column_states(result, ("C01",)).geometry.spherical is spherical
+    np.testing.assert_allclose(simulate(sphere, **OPTIONS)["brf"], sphere["brf"], rtol=ROUNDING)
+    with pytest.raises(InputError, match="sun path 'round' is not known; choose from spherical"):
+        column_states(made.assign_attrs(sun_path="round"), ("C01",))

@@ -22,6 +22,7 @@ from abi_operator.solver.method.doublings import (
 from abi_operator.solver.method.layer import half_layer
 from abi_operator.solver.method.legendre import associated_legendre, legendre_series
 from abi_operator.solver.method.quotient import minus_and_quotient, minus_quotient
+from abi_operator.solver.method.single_scatter import exact_single_scattering
 
 REACH_ERROR = 2e-12  # what `doublings` promises, and rounding
 
@@ -268,3 +269,20 @@ def test_half_layer_is_tanh_up_to_the_reach_of_its_doublings(doublings):
     for found, exact in ((admittance, np.tanh(h)), (impedance, h / np.tanh(h))):
         np.testing.assert_allclose(found.core[0, 0], exact, rtol=REACH_ERROR)
         np.testing.assert_allclose(found.diagonal[0], exact, rtol=REACH_ERROR)
+
+
+@pytest.mark.parametrize(("dtype", "digits"), [(np.float64, 1e-13), (np.float32, 2e-6)])
+def test_light_scattered_once_keeps_its_digits(dtype, digits):
+    """Of two layers, from the thinnest to opaque ones, also about where a series takes over."""
+    depth = np.concatenate([10.0 ** np.arange(-12, 2), np.linspace(0.01, 0.03, 6)])
+    tau = np.stack([depth, depth[::-1]]).astype(dtype)
+    arrays = tau, np.full_like(tau, 0.9), np.ones((2, 1, 20), dtype)
+    mu0, mu = np.full(20, 0.5, dtype), np.full((1, 20), 0.7, dtype)
+    sun = np.full_like(tau, 2)
+    found = exact_single_scattering(*map(jnp.asarray, (*arrays, mu0, mu, sun)))
+    assert found.dtype == dtype
+    secant = 2 + 1 / mu[0].astype(float)
+    first, second = -np.expm1(-secant * tau.astype(float))
+    both = first + np.exp(-secant * tau[0].astype(float)) * second
+    wanted = 0.9 * both / secant / (4 * 0.5 * mu[0].astype(float))
+    np.testing.assert_allclose(found[0], wanted, rtol=digits)

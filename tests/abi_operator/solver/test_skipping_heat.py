@@ -1,0 +1,113 @@
+"""What columns that emit do not need: radiances within the budget, slopes of every layer."""
+
+from functools import cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from surfaces import Constant
+
+from abi_operator.solver import toa_radiance
+from abi_operator.solver.skipping.grouping import Alike, Limits, grouped
+from abi_operator.solver.skipping.heat import unscattered
+
+STREAMS, LAYERS, COLUMNS = 4, 12, 64
+DARK = 0.01  # reflectance below which errors are of that
+ROUNDING = 1e-12
+
+
+@cache
+def columns():
+    """Air that absorbs, a tenth of it with a cloud, over warm ground; the last half by night."""
+    rng = np.random.default_rng(0)
+    share = np.sort(rng.uniform(0, 1, (COLUMNS, LAYERS)), axis=1)
+    tau = 10 ** rng.uniform(-2, 1.2, (COLUMNS, 1)) * share / share.sum(axis=1, keepdims=True)
+    scattered = 1e-4 * np.ones_like(tau)
+    scattered[:: COLUMNS // 6, 5:8] = rng.uniform(0.1, 2, 3)
+    angles = rng.uniform(0.3, 1, (2, COLUMNS))
+    planck = np.sort(10 ** rng.uniform(-2.5, 0, (COLUMNS, LAYERS + 1)), axis=1)
+    albedo = rng.uniform(0, 0.4, COLUMNS)
+    degrees = np.arange(STREAMS + 1)
+    return {
+        "tau": tau + scattered,
+        "ssa": scattered / (tau + scattered),
+        "moments": np.broadcast_to(0.7**degrees, (COLUMNS, LAYERS, STREAMS + 1)).copy(),
+        "phase_function": np.full((COLUMNS, LAYERS), 0.4),
+        "albedo": albedo,
+        "mu0": angles[0],
+        "mu": angles[1],
+        "relative_azimuth": rng.uniform(0, np.pi, COLUMNS),
+        "solar_irradiance": np.where(np.arange(COLUMNS) < COLUMNS // 2, 10.0, 0.0),
+        "planck_levels": planck,
+        "surface_emission": (1 - albedo) * 1.2 * planck[:, -1],
+    }
+
+
+@cache
+def solved(error_budget):
+    return np.asarray(toa_radiance(**columns(), num_streams=STREAMS, error_budget=error_budget))
+
+
+@pytest.mark.parametrize("error_budget", [1e-2, 1e-3])
+def test_radiances_are_within_the_budget(error_budget):
+    given = columns()
+    sun = given["solar_irradiance"] * given["mu0"] / np.pi
+    wrong = np.abs(solved(error_budget) - solved(None)) / np.maximum(solved(None), DARK * sun)
+    assert 0 < np.quantile(wrong, 0.99) < error_budget
+    # Of thermal light that nothing scatters nothing is lost, and little is scattered of it here.
+    clear = given["ssa"].max(axis=1) < 0.05
+    assert wrong[clear].max() < 0.5 * error_budget
+
+
+def test_slopes_are_those_of_every_layer():
+    def total(arguments, error_budget):
+        return jnp.sum(toa_radiance(**arguments, num_streams=STREAMS, error_budget=error_budget))
+
+    found, whole = (jax.grad(total)(columns(), budget) for budget in (1e-2, None))
+    for name, slope in found.items():
+        np.testing.assert_allclose(slope, whole[name], rtol=ROUNDING, err_msg=name)
+
+
+def test_other_grounds_are_solved_whole():
+    given = columns() | {"albedo": Constant(jnp.asarray(columns()["albedo"]))}
+    whole, found = (
+        np.asarray(toa_radiance(**given, num_streams=STREAMS, error_budget=budget))
+        for budget in (None, 1e-2)
+    )
+    np.testing.assert_allclose(found, whole, rtol=ROUNDING)
+
+
+def test_unscattered_light_does_not_depend_on_how_layers_are_cut():
+    """Of a Planck function that is linear in the optical depth of homogeneous air."""
+    depth = np.linspace(0, 3, 13)
+    planck = 1 + 2 * depth
+    secant = jnp.asarray([1.5])
+
+    def light(levels, of_levels):
+        tau, jumps = np.diff(levels)[:, None], np.diff(of_levels)[:, None]
+        coalbedo = np.full_like(tau, 0.8)
+        arrays = map(jnp.asarray, (tau, coalbedo, of_levels[:-1, None], jumps))
+        return unscattered(*arrays, secant, STREAMS)
+
+    fine, coarse = light(depth, planck), light(depth[[0, 12]], planck[[0, 12]])
+    np.testing.assert_allclose(fine.up, coarse.up, rtol=ROUNDING)
+    np.testing.assert_allclose(fine.down, coarse.down, rtol=ROUNDING)
+    # By hand: 0.8 times the integral of (1 + 2 t) exp(-1.5 t) 1.5 from 0 to 3.
+    through = np.exp(-4.5)
+    wanted = 0.8 * (1 - 7 * through + 2 / 1.5 * (1 - through))
+    np.testing.assert_allclose(fine.up, wanted, rtol=ROUNDING)
+
+
+def test_layers_that_scatter_their_own_light_stay_apart():
+    tau = jnp.ones((4, 1))
+    planck = jnp.asarray([1.0, 1.0, 10.0, 10.0, 10.0])[:, None]
+    limits = Limits(jnp.full(1, 2.0), jnp.full(1, 1e-2), np.inf)
+
+    def labels(ssa):
+        alike = Alike(tau, ssa * tau, 0 * tau, planck, jnp.ones(1))
+        return np.asarray(grouped(alike, limits).labels)[:, 0]
+
+    np.testing.assert_array_equal(labels(1e-4), 0)
+    # The second is 10 times as warm at its lower face; the others are of one temperature.
+    np.testing.assert_array_equal(labels(0.5), [0, 1, 2, 2])
