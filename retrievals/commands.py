@@ -1,5 +1,7 @@
 """Commands that `abi_operator`'s command line finds by their entry points."""
 
+from importlib import import_module
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +16,7 @@ from abi_operator.radiance import FIRE_BANDS
 from .fires import BACKGROUNDS
 from .images import REFLECTIVE
 from .kinds import KINDS, retrieve_kind, retrieve_smoke, vector_of
-from .prior_file import read_prior
+from .prior_file import DECLARED, read_prior
 from .scoring import format_report, score_retrieval
 
 RETRIEVAL = "retrieval.nc"
@@ -63,6 +65,20 @@ def retrieve(
         bool,
         typer.Option(help="Write averaging kernels, gains and errors by source, too."),
     ] = False,
+    smooth: Annotated[
+        float | None,
+        typer.Option(
+            help="Retrieve the image as a whole: pixels up to about so many pixels apart are "
+            "alike. With the 'declared' prior unless --prior names one."
+        ),
+    ] = None,
+    where: Annotated[
+        str | None,
+        typer.Option(
+            help="'all' to retrieve every usable pixel and not only where there is a plume or "
+            "cloud, or where a fire stands out; without plume it needs a prior."
+        ),
+    ] = None,
     background: Annotated[
         str | None,
         typer.Option(
@@ -84,10 +100,15 @@ def retrieve(
             )
         )
         _check_background(kind, background)
+        prior = _smooth_prior(kind, smooth, diagnostics, prior)
+        if where not in (None, "all"):
+            raise ValueError(f"--where is 'all' or nothing; got {where!r}.")
         vector = vector_of(kind, retrieve_ssa, effective_radius)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     how: dict[str, Any] = {} if background is None else {"background": background}
+    how |= {} if where is None else {"where": where}
+    how |= {} if smooth is None else {"smooth": smooth}
     with one_sentence(), read_result(result) as dataset:
         retrieval = retrieve_kind(
             dataset,
@@ -108,6 +129,21 @@ def retrieve(
     typer.echo(f"wrote {out}")
 
 
+def _smooth_prior(
+    kind: str, smooth: float | None, diagnostics: bool, prior: str | None
+) -> str | None:
+    """The prior that is used, as smoothness needs one."""
+    if smooth is None:
+        return prior
+    if kind == "fire":
+        raise ValueError("--smooth is of plumes and cloud; a fire is one pixel's.")
+    if diagnostics:
+        raise ValueError("--diagnostics are of single pixels; leave out --smooth.")
+    if not 0 < smooth < inf:
+        raise ValueError(f"--smooth is a length above 0 pixels; got {smooth:g}.")
+    return DECLARED if prior is None else prior
+
+
 def _check_background(kind: str, background: str | None) -> None:
     if background is not None and kind != "fire":
         raise ValueError(f"--background is of fires; {kind} has none.")
@@ -118,7 +154,16 @@ def _check_background(kind: str, background: str | None) -> None:
 def score(
     result: Annotated[Path, typer.Argument(help="Result of a simulation, with the truth.")],
     retrieval: Annotated[Path, typer.Argument(help="What was retrieved from it.")],
-    csv: Annotated[Path | None, typer.Option(help="File for the scores, too.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option(help="File for the scores, too, those of all bins.")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for pictures of truth, retrieval and error, scatter and coverage; needs "
+            "matplotlib (pip install 'abi-operator[plot]')."
+        ),
+    ] = None,
 ) -> None:
     """Score a retrieval against the truth that was specified."""
     with one_sentence(), read_result(result) as truth, _open_retrieval(retrieval) as retrieved:
@@ -126,7 +171,22 @@ def score(
         if csv is not None:
             with output_folder(csv.absolute().parent) as folder:
                 _write_csv(report, folder / csv.name)
+        if plot is not None:
+            with output_folder(plot) as folder:
+                paths = _pictures().write_pictures(truth, retrieved, folder)
+            for path in paths:
+                typer.echo(f"wrote {plot / path.name}")
     typer.echo(format_report(report))
+
+
+def _pictures() -> Any:
+    """The module that draws, which imports matplotlib."""
+    try:
+        return import_module("retrievals.scoring.pictures")
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"--plot needs {error.name}; install it with pip install 'abi-operator[plot]'."
+        ) from error
 
 
 def finish_demo(folder: Path) -> None:
@@ -160,10 +220,10 @@ def _to_netcdf(retrieval: xr.Dataset, path: Path) -> None:
 
 
 def _write_csv(report: xr.Dataset, path: Path) -> None:
-    """Write scores by group, then counts and shares of result codes."""
-    by_group = report.drop_dims("code").to_dataframe()
-    by_code = report.drop_dims("group").to_dataframe()
-    path.write_text(by_group.to_csv() + "\n" + by_code.to_csv())
+    """Write scores by group, then counts and shares of result codes, then the detection."""
+    dims = [dim for dim in ("group", "code", "detection") if dim in report.dims]
+    tables = [report.drop_dims(set(dims) - {dim}).to_dataframe() for dim in dims]
+    path.write_text("\n".join(table.to_csv() for table in tables))
 
 
 def _open_retrieval(path: Path) -> xr.Dataset:

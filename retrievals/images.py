@@ -22,6 +22,7 @@ from .pixels import retrieve_pixels
 from .prior import Prior
 from .product import Field, diagnostic_fields, make_product, pixel_fields
 from .results import ResultCode
+from .smooth import Smoothness, retrieve_smooth, smoothness
 from .state_vector import StateVector
 
 REFLECTIVE = ("C01", "C02", "C03", "C04", "C05", "C06")
@@ -42,6 +43,7 @@ def retrieve_image(
     diagnostics: bool = False,
     num_streams: int | None = None,
     minimiser: Minimiser = DEFAULT_MINIMISER,
+    smooth: float | None = None,
     attributes: dict[str, Any] | None = None,
 ) -> xr.Dataset:
     """Retrieve a state vector from the result of a simulation, pixel by pixel, in float64.
@@ -79,6 +81,9 @@ def retrieve_image(
         Streams of the solver; None for those of the simulation.
     minimiser
         How, and when to end.
+    smooth
+        Correlation length of what is retrieved, by which each image is retrieved as a whole
+        (`retrievals.smooth`) [pixel]; needs a prior. None for every pixel on its own.
     attributes
         Global attributes of the product beside those of its making.
 
@@ -97,8 +102,15 @@ def retrieve_image(
     ------
     InputError
         Where the Dataset lacks a variable or a band.
+    ValueError
+        Where smooth is not above 0, comes without prior or with diagnostics, which are of single
+        pixels.
     """
     bands = check_bands(bands, REFLECTIVE)
+    if smooth is not None and (prior is None or diagnostics):
+        raise ValueError(
+            "smooth needs a prior, and has no diagnostics, which are of single pixels."
+        )
     _check(dataset, bands, species, vector.size, prior)
     if num_streams is None:
         num_streams = streams_of(dataset)
@@ -121,9 +133,11 @@ def retrieve_image(
                 exact=not noise and prior is None and solved_whole(dataset),
                 diagnostics=diagnostics,
                 assumed=assumed,
+                smooth=None if smooth is None else smoothness(attempted, smooth),
             )
     about = how_made(bands, num_streams, noise, seed, prior)
     about |= {} if species is None else {"species": species}
+    about |= {} if smooth is None else {"smooth_length_in_pixels": smooth}
     about |= attributes or {}
     return make_product(dataset, codes, attempted, fields, (bands, vector.names), about)
 
@@ -138,6 +152,7 @@ def retrieved_fields(
     exact: bool,
     diagnostics: bool,
     assumed: StateVector | None,
+    smooth: Smoothness | None = None,
 ) -> tuple[dict[str, Field], np.ndarray]:
     """Variables of a product, of the pixels in one row, and their result codes.
 
@@ -151,12 +166,19 @@ def retrieved_fields(
         As of `retrieve_pixels`.
     prior, minimiser, diagnostics, assumed
         As of `retrieve_image`.
+    smooth
+        How neighbours are alike; None for every pixel on its own.
     """
     vector, forward = forward.vector, prepared(forward, states)
     of_x = prior.prior(states) if isinstance(prior, StateVector) else prior
-    retrieved = retrieve_pixels(
-        forward, observations, states, prior=of_x, minimiser=minimiser, exact=exact
-    )
+    if smooth is not None and of_x is not None:
+        retrieved = retrieve_smooth(
+            forward, observations, states, prior=of_x, smooth=smooth, minimiser=minimiser
+        )
+    else:
+        retrieved = retrieve_pixels(
+            forward, observations, states, prior=of_x, minimiser=minimiser, exact=exact
+        )
     fields = pixel_fields(vector, retrieved, states, observations.num_values)
     if diagnostics:
         x = np.asarray(retrieved.inversion.x)

@@ -82,14 +82,18 @@ class Derived:
     place
         Path to a part of the state.
     read
-        From that part to an array, or to a dictionary of arrays by band.
+        From that part, and the values of the quantities that it `needs`, to an array, or to a
+        dictionary of arrays by band.
+    needs
+        Names of quantities of the state vector.
     """
 
     name: str
     units: str
     long_name: str
     place: str
-    read: Callable[[Any], Array | dict[str, Array]]
+    read: Callable[..., Array | dict[str, Array]]
+    needs: tuple[str, ...] = ()
 
 
 def part(state: State, place: str) -> Any:

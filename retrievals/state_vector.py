@@ -139,8 +139,13 @@ class StateVector:
         """
 
         def derived(x: Float[Array, " x"]) -> dict[str, Array | dict[str, Array]]:
-            found = self.state(x, state)
-            return {item.name: item.read(part(found, item.place)) for item in self.derived}
+            found, values = self.state(x, state), self.values(x)
+            return {
+                item.name: item.read(
+                    part(found, item.place), *(values[name] for name in item.needs)
+                )
+                for item in self.derived
+            }
 
         gradients = jax.jacfwd(derived)(x)
         sigma = jax.tree.map(lambda g: jnp.sqrt(g @ covariance @ g), gradients)

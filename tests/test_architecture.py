@@ -79,6 +79,18 @@ def test_imports_go_down():
     assert not wrong
 
 
+def test_no_file_or_folder_of_the_retrievals_needs_itself():
+    """Whatever it imports, and what that does, imports it not: there is a lowest floor."""
+    below: dict[str, set[str]] = {}
+    for path in sources("retrievals"):
+        here = path.relative_to(ROOT / "retrievals").parts[0].removesuffix(".py")
+        there = {name.split(".")[0] for name in imported(path, "retrievals")}
+        below.setdefault(here, set()).update(there - {here})
+    while ready := {name for name, needs in below.items() if not needs & set(below)}:
+        below = {name: needs for name, needs in below.items() if name not in ready}
+    assert not below
+
+
 def test_rooms_that_have_not_heard_of_each_other():
     for path in sources("abi_operator"):
         text = path.read_text()

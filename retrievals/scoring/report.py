@@ -1,29 +1,42 @@
 """Scores of a retrieval against the truth in the result it was made from, as a plain table."""
 
-import jax.numpy as jnp
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 
-from abi_operator import LiquidCloud
 from abi_operator.files import InputError
 
-from ..declarations import mean_droplet_radius_um, optical_thickness
+from ..fire_detection import DETECTED
+from ..fires import SCORE
 from ..results import ResultCode, expected_error
-from .metrics import Score, binned_scores, score, standardised_spread
+from .detection import Detection, detection
+from .metrics import Score, binned_scores, score
+from .truths import first_of, known_truths
 
 AOD_EDGES = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, np.inf)
 """Bins of true optical depth. [-]"""
 ALBEDO_EDGES = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 1.0)
 """Bins of surface albedo in C02, or in the first band where that was not used. [-]"""
-
+SUN_EDGES = (0.0, 30.0, 45.0, 60.0, 70.0, 80.0, 90.0, 180.0)
+"""Bins of solar zenith angle. [degree]"""
 THICKNESS_EDGES = (0.0, 1.0, 3.0, 10.0, 30.0, 150.0)
 """Bins of the optical thickness of cloud. [-]"""
+TEMPERATURE_EDGES = (0.0, 500.0, 600.0, 700.0, 800.0, 1000.0, np.inf)
+"""Bins of the temperature of fires. [K]"""
 
-_HEADS = ("", "N", "bias", "rmse", "max", "r", "slope", "inside EE")
+PLUME_AOD = 0.05
+"""Optical depth from which there is a plume to be detected: the expected error of none. [-]"""
+PLUME_DETECTED = 2.0
+"""Optical depth in posterior standard deviations from which a plume is detected. [-]"""
+
+_HEADS = ("", "N", "bias", "rmse", "max", "r", "slope", "inside EE", "68 %", "95 %", "chi2")
+# Codes of pixels that were not attempted.
+_NOT_ATTEMPTED = (ResultCode.NO_PLUME, ResultCode.UNUSABLE, ResultCode.INVALID_INPUT)
 
 
 def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:
-    """Score the pixels that were retrieved with success.
+    """Score the pixels that were retrieved with success and whose truth is known.
 
     Parameters
     ----------
@@ -34,16 +47,14 @@ def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         By ``group``, the numbers of `metrics.Score`: of the first quantity that was retrieved all,
-        bins of its true value, and bins of surface albedo; of what else was retrieved and is known
-        (single-scattering albedo by band, effective radius of cloud) all, under its name. By
-        ``code``, ``code_count`` and ``code_share`` among pixels attempted or refused for another
-        reason than the mask. Mean square and coverage of the first quantity's standardised errors
-        are attributes.
+        bins of its true value, of surface albedo and of the sun; of what else was retrieved and is
+        known (single-scattering albedo by band, effective radius of cloud, share of a fire) the
+        same under its name. By ``code``, ``code_count`` and ``code_share`` among pixels attempted
+        or refused for another reason than the mask. By ``detection``, the numbers of
+        `detection.Detection`, of fires and, where pixels without plume were attempted, of plumes.
     """
     kind = str(retrieval.attrs.get("kind", "smoke"))
-    first = "cloud_optical_thickness" if kind == "cloud" else "aod_550"
-    edges = THICKNESS_EDGES if kind == "cloud" else AOD_EDGES
-    allowed = None if kind == "cloud" else expected_error
+    first = first_of(kind)
     truths = known_truths(result, kind)
     codes = retrieval["result_code"].values
     if truths[first].shape != codes.shape:
@@ -52,77 +63,109 @@ def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:
             "give the retrieval of this result."
         )
     success = codes == ResultCode.SUCCESS
-    nothing = xr.DataArray(np.full(codes.shape, np.nan))  # where no pixel was attempted
+    bins = _bins(result, retrieval, truths[first].values, first)
+    scores: dict[str, Score] = {}
+    for name, truth in truths.items():
+        if name != first and name not in retrieval:
+            continue
+        label = "" if name == first else name
+        allowed = expected_error if name == "aod_550" else None
+        if "band" not in truth.dims:
+            values = [_values(retrieval, name + end, codes.shape) for end in ("", "_sigma")]
+            scores |= _scores(label, values, truth.values, success, bins, allowed)
+            continue
+        for band in retrieval["band"].values:
+            values = [_values(retrieval, name + end, codes.shape, band) for end in ("", "_sigma")]
+            found = _scores(
+                f"{label} {band}", values, truth.sel(band=band).values, success, bins, allowed
+            )
+            scores |= found
+    report = xr.Dataset(_by_group(scores) | _by_code(codes))
+    found = detected(result, retrieval, kind)
+    if found is None:
+        return report
+    names = ("detection", list(Detection._fields))
+    return report.assign_coords(detection=names).assign(
+        detection_value=("detection", np.array(found, float))
+    )
 
-    def of(name: str) -> np.ndarray:
-        return retrieval.get(name, nothing).values[success]
 
-    retrieved, sigma, truth = of(first), of(f"{first}_sigma"), truths[first].values[success]
+def detected(result: xr.Dataset, retrieval: xr.Dataset, kind: str) -> Detection | None:
+    """How well the pixels with a fire or plume were told from the others.
+
+    The score of a fire is ``fire_detection_score``, of every pixel that has one; that of a plume is
+    its optical depth in posterior standard deviations, of the pixels that were attempted, where
+    a plume is an optical depth of `PLUME_AOD` or more.
+
+    Returns
+    -------
+    None of cloud, and where all that was attempted has a plume.
+    """
+    if kind == "fire":
+        values = retrieval[SCORE].values
+        looked = ~np.isnan(values)
+        burns = result["fire_fraction"].values > 0
+        threshold = float(retrieval.attrs.get("detection_threshold", DETECTED))
+        return detection(values[looked], burns[looked], threshold)
+    if kind == "cloud" or "aod_550" not in retrieval:
+        return None
+    looked = ~np.isin(retrieval["result_code"].values, _NOT_ATTEMPTED)
+    there = result[f"{kind}_aod_550"].values[looked] >= PLUME_AOD
+    if there.all():
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = (retrieval["aod_550"] / retrieval["aod_550_sigma"]).values[looked]
+    return detection(np.where(np.isnan(ratio), -np.inf, ratio), there, PLUME_DETECTED)
+
+
+def _values(
+    retrieval: xr.Dataset, name: str, shape: tuple[int, ...], band: str | None = None
+) -> np.ndarray:
+    """A variable of a retrieval, NaN where no pixel was attempted."""
+    if name not in retrieval:
+        return np.full(shape, np.nan)
+    found = retrieval[name]
+    return found.values if band is None else found.sel(band=band).values
+
+
+Bins = Mapping[str, tuple[np.ndarray, tuple[float, ...]]]
+
+
+def _bins(result: xr.Dataset, retrieval: xr.Dataset, truth: np.ndarray, first: str) -> Bins:
+    """What is binned by, of every pixel, and the edges."""
     bands = str(retrieval.attrs["bands"]).split()
     band = "C02" if "C02" in bands else bands[0]
-    albedo = result["surface_albedo"].sel(band=band).values[success]
-    scores = {"all": score(retrieved, truth, allowed)}
-    for name, by, bins in ((first, truth, edges), (f"albedo {band}", albedo, ALBEDO_EDGES)):
-        labels = [f"{name} {low:g}-{high:g}" for low, high in zip(bins, bins[1:], strict=False)]
-        found = binned_scores(retrieved, truth, by, bins, allowed)
+    edges = {
+        "cloud_optical_thickness": THICKNESS_EDGES,
+        "fire_temperature": TEMPERATURE_EDGES,
+    }.get(first, AOD_EDGES)
+    albedo = np.broadcast_to(result["surface_albedo"].sel(band=band).values, truth.shape)
+    bins = {first: (truth, edges), f"albedo {band}": (albedo, ALBEDO_EDGES)}
+    if "solar_zenith_angle" in result:
+        bins["sun"] = (np.broadcast_to(result["solar_zenith_angle"], truth.shape), SUN_EDGES)
+    return bins
+
+
+def _scores(
+    label: str,
+    values: list[np.ndarray],
+    truth: np.ndarray,
+    success: np.ndarray,
+    bins: Bins,
+    allowed: object,
+) -> dict[str, Score]:
+    """Scores of one quantity: all of it, and by bins."""
+    rows = success & np.isfinite(truth)
+    retrieved, sigma = (x[rows] for x in values)
+    true = truth[rows]
+    how = expected_error if allowed is expected_error else None
+    scores = {label or "all": score(retrieved, true, how, sigma)}
+    for name, (by, edges) in bins.items():
+        prefix = f"{label}: {name}" if label else name
+        labels = [f"{prefix} {low:g}-{high:g}" for low, high in zip(edges, edges[1:], strict=False)]
+        found = binned_scores(retrieved, true, by[rows], edges, how, sigma)
         scores |= dict(zip(labels, found, strict=True))
-    for name, others in truths.items():
-        if name == first or name not in retrieval:
-            continue
-        if "band" not in others.dims:
-            scores[name] = score(of(name), others.values[success], None)
-            continue
-        for one in retrieval["band"].values:
-            found, true = (x.sel(band=one).values[success] for x in (retrieval[name], others))
-            scores[f"{name} {one}"] = score(found, true, None)
-    report = xr.Dataset(_by_group(scores) | _by_code(codes))
-    if success.any():
-        square, coverage = standardised_spread(retrieved - truth, sigma)
-        report = report.assign_attrs(mean_square_of_error_by_sigma=square, within_sigma=coverage)
-    return report
-
-
-def known_truths(result: xr.Dataset, kind: str) -> dict[str, xr.DataArray]:
-    """What a result specifies of the quantities of a retrieval, by name.
-
-    Parameters
-    ----------
-    result
-        A result.
-    kind
-        One of `KINDS`.
-
-    Raises
-    ------
-    InputError
-        Where it lacks the truth.
-    """
-    needed = ["liquid_mass_path", "liquid_number_path"] if kind == "cloud" else [f"{kind}_aod_550"]
-    missing = [name for name in [*needed, "surface_albedo"] if name not in result.variables]
-    if missing:
-        raise InputError(
-            f"the result has no {', '.join(missing)}; give the one that the retrieval was made of, "
-            "with all of its variables."
-        )
-    if kind != "cloud":
-        truths = {"aod_550": result[f"{kind}_aod_550"]}
-        if f"{kind}_ssa" in result:
-            truths["ssa"] = _everywhere(result[f"{kind}_ssa"], truths["aod_550"])
-        return truths
-    mass, number = (
-        result[name].transpose(..., "layer") for name in ("liquid_mass_path", "liquid_number_path")
-    )
-    cloud = LiquidCloud(jnp.asarray(mass.values, float), jnp.asarray(number.values, float))
-    image = mass.isel(layer=0, drop=True)
-    return {
-        "cloud_optical_thickness": image.copy(data=np.asarray(optical_thickness(cloud))),
-        "cloud_effective_radius_um": image.copy(data=np.asarray(mean_droplet_radius_um(cloud))),
-    }
-
-
-def _everywhere(by_band: xr.DataArray, image: xr.DataArray) -> xr.DataArray:
-    """A variable (band,) at every pixel of an image."""
-    return by_band if "y" in by_band.dims else by_band.broadcast_like(image)
+    return scores
 
 
 def _by_group(scores: dict[str, Score]) -> dict[str, tuple[str, list]]:
@@ -142,11 +185,15 @@ def _by_code(codes: np.ndarray) -> dict[str, tuple[str, object]]:
 
 
 def format_report(report: xr.Dataset) -> str:
-    """Write a report as text: scores by group, empty ones left out, then the result codes."""
+    """Write a report as text: scores by group, then result codes and detection.
+
+    Empty groups are left out, and the bins of other quantities than the first; the file of the
+    scores has them.
+    """
     rows: list[tuple[str, ...]] = [_HEADS]
     for group in report["group"].values:
         values = Score(*(report[name].sel(group=group).item() for name in Score._fields))
-        if values.num_pairs:
+        if values.num_pairs and ": " not in str(group):
             rows.append((str(group), *_cells(values)))
     widths = [max(len(row[i]) for row in rows) for i in range(len(_HEADS))]
     lines = [
@@ -162,16 +209,28 @@ def format_report(report: xr.Dataset) -> str:
             lines.append(f"{code}: {count} pixels, {100 * share:.1f} %")
             if code != "success":
                 lines.append(f"    {ResultCode[str(code).upper()].message}")
+    if "detection" in report.coords:
+        lines.append(_sentence(Detection(*report["detection_value"].values)))
     return "\n".join(lines)
+
+
+def _sentence(found: Detection) -> str:
+    return (
+        f"detection, score {found.threshold:g} or more: {100 * found.hit_rate:.1f} % of "
+        f"{found.num_true:.0f} pixels hit, false alarms on {100 * found.false_alarm_rate:.2f} % of "
+        f"{found.num_pixels - found.num_true:.0f} others, ROC area {found.roc_area:.4f}"
+    )
 
 
 def _cells(values: Score) -> tuple[str, ...]:
     """Cells of a row after its first one."""
     errors = (f"{x:.1e}" for x in (values.bias, values.rmse, values.max_error))
+    shares = (values.within, values.coverage_68, values.coverage_95)
     return (
         str(values.num_pairs),
         *errors,
         f"{values.correlation:.3f}",
         f"{values.slope:.3f}",
-        f"{100 * values.within:.1f} %",
+        *(f"{100 * x:.1f} %" for x in shares),
+        f"{values.chi_square:.2f}",
     )

@@ -45,9 +45,13 @@ def test_retrieve_and_score(folder, run):
     csv = folder / "scores.csv"
     answer = run("score", folder / "result.nc", out, "--csv", csv)
     assert answer.exit_code == 0, answer.output
-    assert answer.output.split("\n")[0].split() == "N bias rmse max r slope inside EE".split()
+    heads = "N bias rmse max r slope inside EE 68 % 95 % chi2".split()
+    assert answer.output.split("\n")[0].split() == heads
     assert "success: " in answer.output
     assert csv.read_text().startswith("group,num_pairs,bias,rmse,max_error,")
+    answer = run("score", folder / "result.nc", out, "--plot", folder / "drawn")
+    assert answer.exit_code == 0, answer.output
+    assert (folder / "drawn" / "aod_550_scatter.png").is_file()
     image = folder / "image.nc"
     with xr.open_dataset(folder / "result.nc", decode_times=False) as result:
         result.drop_vars(["pressure", "smoke_ssa", "smoke_aod_550"]).to_netcdf(image)
@@ -78,6 +82,22 @@ def test_a_prior_from_a_file_and_diagnostics(folder, run):
         assert (done["aod_550_error_due_to_albedo_C02"] > 0).all()
         assert (done["cost"] > 0).all() and (done["prior_cost"] > 0).all()
         assert written.attrs["prior"] == "normal distribution"
+
+
+def test_an_image_is_retrieved_as_a_whole(folder, run):
+    result, out = folder / "result.nc", folder / "smooth.nc"
+    answer = run("retrieve", "smoke", result, "--out", out, "--noise", "--smooth", "1.5")
+    assert answer.exit_code == 0, answer.output
+    with xr.open_dataset(out) as written:
+        assert written.attrs["smooth_length_in_pixels"] == 1.5
+        assert written.attrs["prior"] == "normal distribution"
+        assert np.isfinite(written["aod_550_sigma"]).all()
+        assert (written["num_steps"] > 0).all()
+    for options in (("--smooth", "0"), ("--smooth", "2", "--diagnostics")):
+        answer = run("retrieve", "smoke", result, "--out", out, *options)
+        assert answer.exit_code == 2 and "--smooth" in answer.stderr
+    answer = run("retrieve", "fire", result, "--out", out, "--smooth", "2")
+    assert answer.exit_code == 2 and "a fire is one pixel's" in answer.stderr
 
 
 def test_the_demonstration_ends_with_scores(folder, capsys):

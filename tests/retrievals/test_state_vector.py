@@ -76,6 +76,36 @@ def test_transforms_are_smooth_and_have_an_inverse(transform, values):
         assert (value >= transform.lower).all() and (value <= transform.upper * 1.000001).all()
 
 
+def test_mass_loading_is_that_of_another_reckoning():
+    """0.216 m2 g-1 of ash of 3 um, ln 2 wide, at 2.6 g cm-3, by Mie theory at 555 nm."""
+    (item,) = plume("ash", effective_radius=True).derived
+    assert item.name == "mass_loading" and item.needs == ("aod_550", "effective_radius_um")
+
+    def mass(radius_um):
+        return item.read(None, jnp.asarray(0.5), radius_um)
+
+    np.testing.assert_allclose(mass(jnp.asarray(3.0)), 0.5 / 0.216, rtol=5e-3)
+    slope = jax.grad(mass)(jnp.asarray(3.0))
+    low, high = (mass(jnp.asarray(r)) for r in (2.999, 3.001))
+    np.testing.assert_allclose(slope, (high - low) / 0.002, rtol=1e-6)
+
+
+def test_mass_loading_has_the_error_of_what_it_is_made_of(state):
+    vector = plume("dust", effective_radius=True)
+    x, covariance = vector.x(0.5, 3.0), jnp.asarray([[0.04, -0.01], [-0.01, 0.09]])
+    found = vector.report(x, state, covariance)
+    (item,) = vector.derived
+
+    def mass(x):
+        return float(item.read(None, *vector.values(jnp.asarray(x)).values()))
+
+    step = 1e-6
+    slopes = [(mass(x + step * unit) - mass(x - step * unit)) / (2 * step) for unit in np.eye(2)]
+    np.testing.assert_allclose(found["mass_loading"], mass(x), rtol=ROUNDING)
+    expected = np.sqrt(slopes @ np.asarray(covariance) @ slopes)
+    np.testing.assert_allclose(found["mass_loading_sigma"], expected, rtol=1e-6)
+
+
 def test_limits_are_in_order():
     for limits in ((1.0, 1.0), (2.0, 1.0), (0.0, np.inf)):
         with pytest.raises(ValueError, match="lower < upper"):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from retrievals.results import expected_error
-from retrievals.scoring import binned_scores, score
-from retrievals.scoring.metrics import standardised_spread
+from retrievals.scoring import binned_scores, detection, score
 
 TRUTH = np.array([0.0, 1.0, 2.0, 3.0])
 RETRIEVED = np.array([0.1, 1.0, 2.4, 4.0])
@@ -42,5 +41,27 @@ def test_bins_share_edges_with_the_one_below():
 
 
 def test_standardised_errors():
-    square, within = standardised_spread(np.array([1.0, -2.0]), np.array([2.0, 1.0]))
-    assert square == pytest.approx((0.25 + 4) / 2) and within == 0.5
+    scored = score(np.array([1.0, -1.8]), np.zeros(2), sigma=np.array([2.0, 1.0]))
+    assert scored.chi_square == pytest.approx((0.25 + 3.24) / 2)
+    assert scored.coverage_68 == 0.5 and scored.coverage_95 == 1
+    assert np.isnan(score(RETRIEVED, TRUTH).chi_square)
+
+
+def test_normal_errors_are_covered_as_they_should_be():
+    rng = np.random.default_rng(8)
+    sigma = rng.uniform(0.5, 2, 20_000)
+    scored = score(sigma * rng.standard_normal(20_000), np.zeros(20_000), None, sigma)
+    # 4 standard errors of 20,000 draws
+    assert abs(scored.coverage_68 - 0.6827) < 4 * np.sqrt(0.6827 * 0.3173 / 20_000)
+    assert abs(scored.coverage_95 - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 20_000)
+    assert abs(scored.chi_square - 1) < 4 * np.sqrt(2 / 20_000)
+    assert scored.percentile_5 < scored.percentile_25 < scored.percentile_75 < scored.percentile_95
+
+
+def test_detection_by_hand():
+    found = detection(np.array([5.0, 1.0, 3.0, -np.inf, 2.0]), np.array([1, 1, 0, 0, 0], bool), 2.5)
+    assert (found.hit_rate, found.false_alarm_rate, found.false_alarm_ratio) == (0.5, 1 / 3, 0.5)
+    # of 6 pairs, 5 exceeds all three and 1 the last alone
+    assert found.roc_area == pytest.approx(4 / 6)
+    assert detection(np.ones(4), np.array([1, 0, 1, 0], bool), 1.0).roc_area == 0.5  # all tie
+    assert np.isnan(detection(np.ones(2), np.zeros(2, bool), 1.0).roc_area)

@@ -1,0 +1,130 @@
+"""An image retrieved as a whole, under the veil."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from veil import TWO
+
+from retrievals import Prior, ResultCode, measurement, retrieve_pixels
+from retrievals.input_checks import checked
+from retrievals.kinds import BANDS
+from retrievals.smooth import (
+    joint_cost,
+    joint_gradient,
+    linearised,
+    retrieve_smooth,
+    smoothness,
+)
+
+SHAPE, LENGTH = (16, 16), 3.0
+PRIOR = Prior(np.asarray(TWO.vector.x(0.3, 0.0)), np.diag([0.8**2, 0.05**2]))
+
+
+def precision(smooth, num_pixels):
+    """Q as a matrix."""
+    return np.asarray(smooth(jnp.eye(num_pixels)))
+
+
+@pytest.fixture(scope="module")
+def image():
+    """Observations, states, and x drawn from the prior with the smoothness of the retrieval."""
+    rng = np.random.default_rng(6)
+    smooth = smoothness(np.ones(SHAPE, bool), LENGTH)
+    root = np.linalg.cholesky(np.linalg.inv(precision(smooth, 256)))
+    x = PRIOR.x_prior + (root @ rng.standard_normal((256, 2))) @ np.sqrt(PRIOR.S_prior)
+    ground = rng.uniform(0.03, 0.2, (256, 1)) * np.ones(3)
+    seen = np.asarray(TWO(jnp.asarray(x), jnp.asarray(ground)))
+    noisy = seen + 8 * measurement(seen, BANDS).sigma * rng.standard_normal(seen.shape)
+    observation = measurement(noisy, BANDS)
+    worse = type(observation)(observation.measured, 8 * observation.sigma)
+    return worse, ground, x, smooth
+
+
+def test_single_pixels_keep_their_own_prior():
+    smooth = smoothness(np.ones((31, 31), bool), LENGTH)
+    matrix = precision(smooth, 961)
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
+    np.testing.assert_allclose(smooth.diagonal(961), np.diagonal(matrix), rtol=1e-12)
+    covariance = np.linalg.inv(matrix).reshape(31, 31, 31, 31)[15, 15]
+    # Five lengths from the edges, where the rest of the correlation is 2 %.
+    assert covariance[15, 15] == pytest.approx(1, abs=1e-3)
+    # The sum over the waves of an endless grid, and Matern's correlation of smoothness 1,
+    # (h / l) K_1(h / l), from which a grid of so few pixels a length departs by 0.03.
+    wave = 2 * np.pi * np.arange(256) / 256
+    spectrum = (1 + 2 * LENGTH**2 * (2 - np.cos(wave)[:, None] - np.cos(wave))) ** -2
+    for lag, matern in ((3, 0.602), (6, 0.280)):
+        expected = np.mean(spectrum * np.cos(lag * wave)) / np.mean(spectrum)
+        assert covariance[15, 15 + lag] == pytest.approx(expected, abs=2e-3)
+        assert expected == pytest.approx(matern, abs=0.03)
+
+
+def test_neighbours_are_those_that_are_retrieved():
+    chosen = np.ones((2, 2, 3), bool)  # two images
+    chosen[0, 0, 1] = False
+    smooth = smoothness(chosen, 1.0)
+    pairs = {tuple(sorted(p)) for p in np.stack([smooth.one, smooth.other], axis=1).tolist()}
+    # rows 0 . 1 / 2 3 4 and 5 6 7 / 8 9 10
+    first = {(0, 2), (1, 4), (2, 3), (3, 4)}
+    second = {(5, 6), (6, 7), (8, 9), (9, 10), (5, 8), (6, 9), (7, 10)}
+    assert pairs == first | second
+    with pytest.raises(ValueError, match="above 0 pixels; got 0"):
+        smoothness(chosen, 0.0)
+
+
+def test_the_gradient_is_that_of_the_cost(image):
+    observation, ground, _, smooth = image
+    _, usable, prior = checked(TWO, observation, PRIOR)
+    rng = np.random.default_rng(3)
+    z, along = rng.standard_normal((2, 256, 2))
+    here = linearised(TWO, usable, ground, prior, z)
+    slope = 2 * float(jnp.sum(joint_gradient(here, smooth, jnp.asarray(z)) * along))
+
+    def cost(step):
+        there = z + step * along
+        return joint_cost(linearised(TWO, usable, ground, prior, there), smooth, there)
+
+    step = 1e-5  # the error of differences is its square, that of rounding 1e-16 / step of the cost
+    np.testing.assert_allclose((cost(step) - cost(-step)) / (2 * step), slope, rtol=1e-7)
+
+
+def test_a_joint_image_is_better_than_its_pixels(image):
+    observation, ground, x, smooth = image
+    alone = retrieve_pixels(TWO, observation, ground, prior=PRIOR)
+    found = retrieve_smooth(TWO, observation, ground, prior=PRIOR, smooth=smooth)
+    assert np.mean(found.codes == ResultCode.SUCCESS) > 0.97
+    errors = [np.sqrt(np.mean((r.inversion.x - x) ** 2, axis=0)) for r in (alone, found)]
+    # The brightness of the ground is known well by single pixels, the optical depth is not.
+    assert (errors[1] < np.array([0.8, 0.95]) * errors[0]).all()
+    # At the minimum the gradient vanishes, and the covariance is the inverse of A.
+    _, usable, prior = checked(TWO, observation, PRIOR)
+    sigma = np.sqrt(np.diagonal(PRIOR.S_prior))
+    z = (found.inversion.x - PRIOR.x_prior) / sigma
+    here = linearised(TWO, usable, ground, prior, z)
+    first = linearised(TWO, usable, ground, prior, 0 * z)
+    gradients = [
+        np.abs(joint_gradient(h, smooth, jnp.asarray(at))).max()
+        for h, at in ((here, z), (first, 0 * z))
+    ]
+    assert gradients[0] < 1e-2 * gradients[1]
+    blocks = jax.scipy.linalg.block_diag(*np.einsum("pbx,pby->pxy", here.jacobian, here.jacobian))
+    matrix = np.asarray(blocks) + np.kron(precision(smooth, 256), np.eye(2))
+    exact = np.sqrt(np.diagonal(np.linalg.inv(matrix)).reshape(256, 2)) * sigma
+    stated = np.sqrt(np.diagonal(found.inversion.covariance, axis1=1, axis2=2))
+    # A standard deviation from 32 draws alone would be known to 1 / sqrt(64); most is without them.
+    assert np.std(stated / exact) < 0.05 and abs(np.mean(stated / exact) - 1) < 0.02
+    np.testing.assert_allclose(stated, exact, rtol=0.2)
+    ratio = np.abs(found.inversion.x - x) / stated
+    assert abs(np.mean(ratio < 1) - 0.683) < 0.08  # correlated errors: fewer than 512 are free
+
+
+def test_a_pixel_without_measurements_is_filled_and_says_so(image):
+    observation, ground, _, smooth = image
+    measured = np.array(observation.measured)
+    measured[100] = np.nan
+    broken = type(observation)(measured, observation.sigma)
+    found = retrieve_smooth(TWO, broken, ground, prior=PRIOR, smooth=smooth)
+    assert found.codes[100] == ResultCode.INVALID_INPUT
+    assert np.isfinite(found.inversion.x).all()
+    around = found.inversion.x[[99, 101, 84, 116]]
+    assert (np.abs(found.inversion.x[100] - around.mean(axis=0)) < 2 * np.ptp(around, axis=0)).all()
