@@ -51,9 +51,10 @@ def demo(
     """Make up a smoky Californian coast and simulate it: a first run, which needs no files.
 
     Writes model output, albedo, a plume's picture and a table of fires, as `abi-operator simulate`
-    takes them, into the folder inputs, and beside it result.nc and a picture of it in natural colours. Where the
-    retrievals are installed, which come with this package, the smoke is then retrieved from the
-    simulated image and compared with the smoke that was made up (retrieval.nc, scores.csv).
+    takes them, into the folder inputs, and beside it result.nc and a picture of it in natural
+    colours. Where the retrievals are installed, which come with this package, the smoke is then
+    retrieved from the simulated image and compared with the smoke that was made up (retrieval.nc,
+    scores.csv).
     """
     with one_sentence(), user_warnings():
         before = pictures_of_before(out)
