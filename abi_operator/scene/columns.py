@@ -125,7 +125,8 @@ class _Reader:
 def _fire(reader: _Reader) -> Fire:
     fraction, hot = (reader.values(f"fire_{name}") for name in ("fraction", "temperature"))
     # Of a fire that is none nothing is seen, but a number has to be there.
-    return Fire(fraction, np.where(fraction > 0, hot, _NO_FIRE))
+    temperature: Any = np.where(fraction > 0, hot, _NO_FIRE)
+    return Fire(fraction, temperature)
 
 
 def _plume(reader: _Reader, species: str, bands: tuple[str, ...]) -> Plume:

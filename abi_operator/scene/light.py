@@ -64,13 +64,13 @@ def light(
         fields = _of_sunlight(dataclasses.replace(states, fire=None), flags, bands, settings)
     irradiance = np.array([solar_irradiance(x, satellite) / (np.pi * distance**2) for x in bands])
     fields["radiance"] = fields["reflectance_factor"] * irradiance
+    uncounted = None if listener is None else Unheard(listener)
     mu0 = np.cos(np.asarray(states.geometry.solar_zenith))
     for k, band in enumerate(bands):
         shines = _shining(states, flags, band)
         if not shines.any():
             continue
-        counted = listener is None or band in THERMAL
-        with listening(listener if counted else Unheard(listener)):
+        with listening(listener if band in THERMAL else uncounted):
             seen = radiance(
                 _some(states, shines),
                 (band,),
