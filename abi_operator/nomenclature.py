@@ -6,8 +6,9 @@ Three Datasets follow each other, and each is described by names of this table:
   *top first* (layer 0 is the uppermost), dimensions ``time layer y x`` (``level`` for edges);
 - the **scenario**: one time of a scene (``layer y x``), completed to the top of the atmosphere,
   with clouds as paths, surface albedo by band, angles in degrees, the plumes that were specified,
-  and where they are to be simulated gases, other hydrometeors, temperatures (`OPTIONAL`) and fires
-  (`FIRE`). It is the truth, and everything that the operator reads;
+  and where they are to be simulated gases, other hydrometeors, temperatures (`OPTIONAL`),
+  anisotropic grounds (`GROUND`) and fires (`FIRE`). It is the truth, and everything that the
+  operator reads;
 - the **result**: the scenario, the radiances and reflectances simulated from it and the optical
   depths they contain. A retrieval reads it back.
 
@@ -97,6 +98,8 @@ MODEL: dict[str, Variable] = {
     ),
     "land_use": Variable(HORIZONTAL, "1", "number of the category of land use"),
     "snow_mass": Variable(HORIZONTAL, "kg m-2", "snow on the ground", "surface_snow_amount"),
+    "wind_along_x": Variable(HORIZONTAL, "m s-1", "wind at 10 m along the rows of the grid"),
+    "wind_along_y": Variable(HORIZONTAL, "m s-1", "wind at 10 m across the rows of the grid"),
 }
 
 BY_BAND: dict[str, Variable] = {
@@ -145,6 +148,19 @@ OPTIONAL: dict[str, Variable] = {
 }
 """What a scenario has where gases or emission are simulated. Of hydrometeors other than cloud water
 it has ``{class}_mass_path`` and ``{class}_number_path`` (layer, y, x)."""
+
+GROUND: dict[str, Variable] = {
+    "volume_kernel_weight": Variable(
+        ("band", "y", "x"), "1", "weight of the Ross-Thick kernel in the reflectance of the land"
+    ),
+    "geometric_kernel_weight": Variable(
+        ("band", "y", "x"), "1", "weight of the Li-Sparse-Reciprocal kernel, likewise"
+    ),
+    "water_share": Variable(HORIZONTAL, "1", "share of the ground that is open, glinting water"),
+    "wind_speed": Variable(HORIZONTAL, "m s-1", "wind speed at 10 m", "wind_speed"),
+}
+"""What a scenario has where its ground is not Lambertian: land by its white-sky albedo and these
+weights (`surface.RossLi`), open water by its wind (`surface.Ocean`)."""
 
 FIRE: dict[str, Variable] = {
     "fire_fraction": Variable(HORIZONTAL, "1", "share of the ground that burns"),
@@ -225,7 +241,7 @@ LARGEST_SHARE_OUTSIDE = 0.1
 
 def variable(name: str) -> Variable | None:
     """Look a Dataset variable up by name; None where the project does not define it."""
-    for table in (RESULT, SCENARIO, OPTIONAL, FIRE, OPTIONAL_RESULT, MODEL, BY_BAND):
+    for table in (RESULT, SCENARIO, OPTIONAL, GROUND, FIRE, OPTIONAL_RESULT, MODEL, BY_BAND):
         if name in table:
             return table[name]
     owner, _, quantity = name.partition("_")

@@ -131,6 +131,8 @@ WEATHER: dict[str, Range] = {
     "temperature": Range(100.0, 500.0, "[]", "K"),
     # From the Antarctic plateau, at 175 K (Scambos et al. 2018, doi:10.1029/2018GL078133), to lava.
     "surface_temperature": Range(150.0, 1500.0, "[]", "K"),
+    # Foam covers all of a sea from 37 m/s on by the law that `surface.Ocean` follows.
+    "wind_speed": Range(0.0, 37.0, "[]", "m s-1"),
     # Less than a whole column of air weighs.
     "mass_path": Range(0.0, 1.0e4, "[]", "kg m-2"),
 }

@@ -23,6 +23,8 @@ _COVERS = {
     "last_resort_albedo_count": "land with the albedo of last resort",
     "sea_ice_count": "ice on the sea",
     "snow_count": "snow on the ground",
+    "kernel_count": "land that reflects by kernels",
+    "water_count": "water that glints",
 }
 
 

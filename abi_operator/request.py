@@ -9,7 +9,7 @@ from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import GRASSO2013
 from .files.stored import ALL
 from .optics import ALL_GASES
-from .scene import ERROR_BUDGET, DropletNumber, Emissivity, IceAlbedo, LandAlbedo
+from .scene import ERROR_BUDGET, DropletNumber, Emissivity, IceAlbedo, LandAlbedo, OceanWind
 
 
 class Species(StrEnum):
@@ -30,6 +30,10 @@ class Request(NamedTuple):
         MODIS albedo, as `files.read_mcd43a1` takes it.
     ocean_albedo
         Albedo of water, in all bands. [-]
+    land_kernels
+        Whether land reflects by the kernels of the albedo file.
+    ocean_wind
+        As `scene.scenario` takes it, in place of `ocean_albedo`.
     plume
         Picture of a plume, as `files.read_plume` takes it.
     plume_species, plume_aod
@@ -66,6 +70,8 @@ class Request(NamedTuple):
     plume_species: Species = Species.SMOKE
     plume_aod: float = 2.0
     fires: Path | None = None
+    land_kernels: bool = False
+    ocean_wind: OceanWind | None = None
     bands: tuple[str, ...] = GRASSO2013
     broadband: bool = False
     emissivity: Emissivity | None = None

@@ -64,6 +64,21 @@ def simulate(
             min=0, max=1, help="How bright water is, in all bands but C07: 0.03 to 0.06 is usual."
         ),
     ] = None,
+    land_kernels: Annotated[
+        bool,
+        typer.Option(
+            "--land-kernels",
+            help="Let land reflect by the kernels of the albedo file (Ross-Li), brighter with the "
+            "sun behind the satellite, and not evenly.",
+        ),
+    ] = False,
+    ocean_wind: Annotated[
+        str | None,
+        typer.Option(
+            help="Let water glint, by a wind of so many m/s or by the model's (model), in place of "
+            "--ocean-albedo."
+        ),
+    ] = None,
     land_albedo: Annotated[
         str | None,
         typer.Option(
@@ -243,6 +258,8 @@ def simulate(
         bands=names,
         albedo=albedo,
         ocean_albedo=ocean_albedo,
+        land_kernels=land_kernels,
+        ocean_wind=_number(ocean_wind),
         land_albedo=_number(land_albedo),
         sea_ice_albedo=_number(sea_ice_albedo),
         snow_albedo=_number(snow_albedo),

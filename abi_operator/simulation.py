@@ -13,6 +13,7 @@ import xarray as xr
 
 from .drawing import Painter
 from .files import (
+    InputError,
     ResultWriter,
     WrfSeries,
     check_variables,
@@ -46,6 +47,7 @@ from .scene import (
     check_ice_optics,
     check_land_albedo,
     check_microphysics,
+    check_ocean_wind,
     check_sight,
     classes_present,
     completion_heights,
@@ -131,7 +133,11 @@ def open_scene(request: Request) -> Scene:
     solar = tuple(band for band in request.bands if band not in THERMAL)
     albedo = None
     if request.albedo is not None and solar:
-        albedo = read_mcd43a1(request.albedo, solar, broadband=request.broadband)
+        albedo = read_mcd43a1(
+            request.albedo, solar, broadband=request.broadband, kernels=request.land_kernels
+        )
+    elif request.land_kernels:
+        raise InputError("kernels of the land are those of an albedo file; name one (--albedo).")
     fires = None if request.fires is None else read_fires(request.fires)
     inside = None
     tops, present = [], set()
@@ -145,6 +151,7 @@ def open_scene(request: Request) -> Scene:
             request.ocean_albedo,
             request.emissivity,
             request.land_albedo,
+            request.ocean_wind,
         )
         if fires is not None:
             found = fires_inside(fires, place)
@@ -152,6 +159,8 @@ def open_scene(request: Request) -> Scene:
         for rows in row_blocks(shape, _BLOCK_COLUMNS):
             model = series.read(time, rows)
             check_land_albedo(request.land_albedo, model)
+            if request.ocean_wind is not None:
+                check_ocean_wind(request.ocean_wind, model)
             if set(request.bands) & set(THERMAL):
                 check_emissivity(request.emissivity, model)
             if request.droplet_number is not None:
@@ -192,6 +201,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         scenario,
         albedo=scene.albedo,
         ocean_albedo=request.ocean_albedo,
+        ocean_wind=request.ocean_wind,
         land_albedo=request.land_albedo,
         sea_ice_albedo=request.sea_ice_albedo,
         snow_albedo=request.snow_albedo,

@@ -11,6 +11,7 @@ from ..constants import (
     STANDARD_PRESSURE,
     VAPOUR_GAS_CONSTANT,
 )
+from .landscape import INLAND
 
 TOP_PRESSURE = 5000.0
 """Pressure at the top of the model. [Pa]"""
@@ -29,6 +30,8 @@ _LAND = np.array(
     [(0, 302.0, 0.14), (1500, 290.0, 0.20), (3000, 281.0, 0.18), (6000, 262.5, 0.20)]
     + [(11000, 224.5, 0.20), (16000, 207.0, 0.01), (25000, 217.0, 0.001)]
 ).T
+# Wind inland and at sea. [m s-1]
+_WIND_INLAND, _WIND_AT_SEA = 9.0, 4.0
 _VAPOUR_RATIO = DRY_AIR_GAS_CONSTANT / VAPOUR_GAS_CONSTANT
 
 
@@ -100,6 +103,18 @@ def make_air(terrain: np.ndarray, marine: np.ndarray) -> Air:
         air = air._replace(temperature=temperature, vapour=vapour)
         air = with_hydrostatic_height(air, terrain)
     return air
+
+
+def santa_ana(marine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Wind to the east and to the north at 10 m: off the land, and weaker over the sea. [m s-1]
+
+    Parameters
+    ----------
+    marine
+        Weight of the air at sea (y, x), 0 to 1. [-]
+    """
+    speed = _WIND_INLAND + (_WIND_AT_SEA - _WIND_INLAND) * marine
+    return -speed * INLAND[0], -speed * INLAND[1]
 
 
 def saturation_mixing_ratio(pressure: np.ndarray, temperature: np.ndarray) -> np.ndarray:

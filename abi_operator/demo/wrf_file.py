@@ -28,6 +28,7 @@ def write_wrf(
     cloud_water: np.ndarray,
     terrain: np.ndarray,
     land: np.ndarray,
+    wind: tuple[np.ndarray, np.ndarray],
 ) -> None:
     """Write one time of a model run.
 
@@ -45,6 +46,8 @@ def write_wrf(
         Height of the ground (y, x). [m]
     land
         True over land (y, x).
+    wind
+        To the east and to the north, 10 m above the ground (y, x). [m s-1]
     """
     base_pressure = column_pressure(terrain)[1]
     base_geopotential = _base_geopotential(terrain)
@@ -58,6 +61,8 @@ def write_wrf(
         ("LANDMASK", _SURFACE, "", "LAND MASK (1 FOR LAND, 0 FOR WATER)", land),
         ("TSK", _SURFACE, "K", "SURFACE SKIN TEMPERATURE", air.temperature[0] + _SUNLIT * land),
         ("EMISS", _SURFACE, "", "SURFACE EMISSIVITY", np.where(land, 0.95, 0.98)),
+        ("U10", _SURFACE, "m s-1", "U at 10 M", wind[0]),
+        ("V10", _SURFACE, "m s-1", "V at 10 M", wind[1]),
         ("PSFC", _SURFACE, "Pa", "SFC PRESSURE", air.level_pressure[0]),
         ("P", _LAYERS, "Pa", "perturbation pressure", air.pressure - base_pressure),
         ("PB", _LAYERS, "Pa", "BASE STATE PRESSURE", base_pressure),

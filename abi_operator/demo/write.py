@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
-from .air import make_air, with_hydrostatic_height
+from .air import make_air, santa_ana, with_hydrostatic_height
 from .albedo_file import write_albedo
 from .clouds import cloud_mixing_ratio, make_clouds, make_weather, saturate
 from .fire_table import write_fires
@@ -58,7 +58,7 @@ def write_demo(folder: str | PathLike[str], *, size: int = 64, seed: int = 0) ->
     clouds = make_clouds(make_weather(cloud_rng), grid, distance, terrain)
     cloud_water = cloud_mixing_ratio(clouds, clear)
     air = with_hydrostatic_height(saturate(clear, cloud_water), terrain, cloud_water)
-    write_wrf(paths.wrf, grid, air, cloud_water, terrain, distance > 0)
+    write_wrf(paths.wrf, grid, air, cloud_water, terrain, distance > 0, santa_ana(marine))
     write_albedo(paths.albedo, landscape, grid.spacing)
     smoke = make_smoke(smoke_rng, grid)
     picture = np.flipud(np.rint(255 * smoke.brightness).astype(np.uint8))

@@ -24,6 +24,9 @@ VARIABLE_MAP = {
 BROADBAND_STAND_IN: dict[str, str] = {"C01": "vis", "green": "vis", "C02": "vis", "C03": "nir"}
 """Broadband that may stand in for an ABI band where a file has no spectral bands."""
 
+KERNELS = {"volume_kernel_weight": 1, "geometric_kernel_weight": 2}
+"""Weights of kernels that are not constant: ours, and their place in the file."""
+
 _PARAMETERS, _QUALITY = VARIABLE_MAP
 _GRID = ("time", "lat", "lon")
 _NO_INVERSION = 255
@@ -62,7 +65,8 @@ def read_white_sky(path: FilePath, modis_bands: Sequence[str]) -> xr.Dataset:
         lacking = [_PARAMETERS + name for name in modis_bands if _PARAMETERS + name not in file]
         if lacking:
             raise InputError(f"{path} has no {', '.join(lacking)}; request them from AppEEARS.")
-        white_sky, quality, coordinates, num_invalid = _read(file, tuple(modis_bands), path)
+        weights, quality, coordinates, num_invalid = _read(file, tuple(modis_bands), path)
+    white_sky = {name: x @ np.array(WHITE_SKY) for name, x in weights.items()}
     dims = ("modis_band", *_GRID)
     attributes = {
         "units": "1",
@@ -82,7 +86,9 @@ def read_white_sky(path: FilePath, modis_bands: Sequence[str]) -> xr.Dataset:
     )
 
 
-def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = False) -> xr.Dataset:
+def read_mcd43a1(
+    path: FilePath, bands: Sequence[str], *, broadband: bool = False, kernels: bool = False
+) -> xr.Dataset:
     """Read white-sky albedo in bands of ABI from an AppEEARS file of MCD43A1.
 
     White-sky albedo of a MODIS band is f_iso + 0.189184 f_vol - 1.377622 f_geo; that of an ABI
@@ -94,6 +100,9 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
         The file.
     bands
         Bands of ABI, such as ``"C01"``.
+    kernels
+        Whether the weights of the volume and the geometric kernel are returned, too; that of the
+        constant one follows from them and the albedo.
     broadband
         Whether a broadband (vis, nir) may stand in for spectral bands that the file lacks; each
         such band is warned of.
@@ -106,14 +115,17 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
         (``num_outside_unit_interval``), and kernel weights outside the file's valid range
         (``num_outside_valid_range``). ``albedo_quality``, same dimensions, uint8: the worst
         mandatory quality among the MODIS bands used; 0 full inversion, 1 magnitude inversion, 255
-        none. The order of ``lat`` is the file's.
+        none. ``volume_kernel_weight`` and ``geometric_kernel_weight``, likewise, of `kernels`: by
+        the same regression without its constant, NaN where the albedo is. The order of ``lat`` is
+        the file's.
     """
     bands = check_bands(bands, MODIS_TO_ABI)
     with open_netcdf(path, advice=_ADVICE) as file:
         _check_projection(file, path)
         regressions = _choose_regressions(file, bands, broadband, path)
         used = tuple(dict.fromkeys(name for r in regressions for name in r.weights))
-        white_sky, quality, coordinates, num_invalid = _read(file, used, path)
+        weights, quality, coordinates, num_invalid = _read(file, used, path)
+    white_sky = {name: x @ np.array(WHITE_SKY) for name, x in weights.items()}
     albedo = np.stack(
         [r.offset + sum(w * white_sky[n] for n, w in r.weights.items()) for r in regressions]
     )
@@ -131,10 +143,18 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
     quality_attributes = _QUALITY_ATTRIBUTES | {
         "long_name": "worst mandatory quality of the MODIS bands used"
     }
+    of_kernels = {}
+    for name, kernel in KERNELS.items() if kernels else ():
+        values = np.stack(
+            [sum(w * weights[n][..., kernel] for n, w in r.weights.items()) for r in regressions]
+        )
+        values[outside] = np.nan
+        of_kernels[name] = (("band", *_GRID), values, cf_attributes(name))
     return xr.Dataset(
         {
             "surface_albedo": (("band", *_GRID), albedo, albedo_attributes),
             "albedo_quality": (("band", *_GRID), worst, quality_attributes),
+            **of_kernels,
         },
         coords={"band": list(bands), **coordinates},
         attrs={key: file.attrs[key] for key in ("title", "source") if key in file.attrs},
@@ -144,7 +164,7 @@ def read_mcd43a1(path: FilePath, bands: Sequence[str], *, broadband: bool = Fals
 def _read(
     file: xr.Dataset, names: tuple[str, ...], path: FilePath
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict, int]:
-    """White-sky albedo and quality of MODIS bands, coordinates, and invalid kernel weights."""
+    """Kernel weights and quality of MODIS bands, coordinates, and how many weights are invalid."""
     require_variables(
         file,
         ["time", "lat", "lon", *(_QUALITY + name for name in names)],
@@ -153,12 +173,12 @@ def _read(
     )
     coordinates: dict = {name: _axis(file, name, path) for name in ("lat", "lon")}
     coordinates["time"] = ("time", _times(file, path), {"standard_name": "time"})
-    white_sky, quality, num_invalid = {}, {}, 0
+    weights, quality, num_invalid = {}, {}, 0
     for name in names:
-        white_sky[name], invalid = _white_sky_albedo(file, name, path)
+        weights[name], invalid = _kernel_weights(file, name, path)
         quality[name] = _quality(file, name, path)
         num_invalid += invalid
-    return white_sky, quality, coordinates, num_invalid
+    return weights, quality, coordinates, num_invalid
 
 
 def _check_projection(file: xr.Dataset, path: FilePath) -> None:
@@ -210,8 +230,8 @@ def _choose_regressions(
     return chosen
 
 
-def _white_sky_albedo(file: xr.Dataset, name: str, path: FilePath) -> tuple[np.ndarray, int]:
-    """White-sky albedo of a MODIS band, and how many kernel weights were out of range."""
+def _kernel_weights(file: xr.Dataset, name: str, path: FilePath) -> tuple[np.ndarray, int]:
+    """Kernel weights (time, lat, lon, kernel) of a MODIS band, and how many were out of range."""
     parameters = file[_PARAMETERS + name]
     require_dims(parameters, (*_GRID, "Num_Parameters"), path)
     if parameters.sizes["Num_Parameters"] != len(WHITE_SKY):
@@ -227,7 +247,7 @@ def _white_sky_albedo(file: xr.Dataset, name: str, path: FilePath) -> tuple[np.n
     values = load(parameters, path)
     invalid = _outside_valid_range(values, parameters)
     values[invalid] = np.nan
-    return values @ np.array(WHITE_SKY), int(invalid.sum())
+    return values, int(invalid.sum())
 
 
 def _outside_valid_range(values: np.ndarray, array: xr.DataArray) -> np.ndarray:

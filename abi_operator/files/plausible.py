@@ -71,6 +71,8 @@ PLAUSIBLE: dict[str, Range] = {
     # From the mesopause to air that a fire has heated; cloud tops have been seen at 162 K (Proud
     # and Bachmeier 2021, doi:10.1029/2020GL092261), the polar stratosphere is at 180 K.
     "layer_temperature": Range(130.0, 500.0),
+    # Of a gust on Barrow Island on 10 April 1996, 113 m/s, the strongest outside of a tornado.
+    **{name: Range(-150.0, 150.0) for name in ("wind_along_x", "wind_along_y")},
     "land_use": Range(0, 255),  # of one byte in the files that models take it from
     "snow_mass": Range(0, 1e5),  # ice sheets, where a model does not stop counting before
     # A dew point of 43 degrees C at 1000 hPa; the highest observed, in Dhahran on 8 July 2003, is

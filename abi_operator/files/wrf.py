@@ -51,6 +51,8 @@ VARIABLE_MAP = {
     "SEAICE": "sea_ice",
     "SNOWC": "snow_cover",
     "SNOW": "snow_mass",  # as liquid water
+    "U10": "wind_along_x",
+    "V10": "wind_along_y",
     "ALBEDO": "broadband_albedo",
     "IVGTYP": "land_use",
     "LU_INDEX": "land_use",
@@ -76,6 +78,8 @@ _TAKEN_AS_THEY_ARE = (
     "snow_mass",
     "broadband_albedo",
     "land_use",
+    "wind_along_x",
+    "wind_along_y",
 )
 
 _FORMAT_ADVICE = "give a WRF output file (wrfout_*) in NetCDF"

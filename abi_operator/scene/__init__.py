@@ -28,6 +28,8 @@ from .fires import check_fires as check_fires
 from .fires import fires_inside as fires_inside
 from .gases import check_gases as check_gases
 from .gases import gases_of as gases_of
+from .grounds import OceanWind as OceanWind
+from .grounds import check_ocean_wind as check_ocean_wind
 from .hydrometeors import check_microphysics as check_microphysics
 from .land import LandAlbedo as LandAlbedo
 from .land import check_land_albedo as check_land_albedo

@@ -7,6 +7,7 @@ from ..files import InputError
 from ..radiance import THERMAL
 from .albedo_file import albedo_of_file, check_extent
 from .emissivity import Emissivity, check_emissivity, thermal_albedo
+from .grounds import FROM_MODEL, OceanWind, check_ocean_wind, sea_albedo, wind_speed
 from .land import LandAlbedo, check_land_albedo, with_last_resort
 from .snow_and_ice import IceAlbedo, check_ice_albedo, sea_ice_cover, with_snow_and_ice
 
@@ -18,6 +19,7 @@ def surface_albedo(
     ocean_albedo: float | None,
     emissivity: Emissivity | None = None,
     *,
+    ocean_wind: OceanWind | None = None,
     land_albedo: LandAlbedo | None = None,
     sea_ice_albedo: IceAlbedo | None = None,
     snow_albedo: IceAlbedo | None = None,
@@ -42,6 +44,9 @@ def surface_albedo(
         One albedo for all bands but C07. [-]
     emissivity
         Of the ground in C07; see `thermal_albedo`.
+    ocean_wind
+        Wind by which open water has the white-sky albedo of a sea (`sea_albedo`), in place of
+        `ocean_albedo`.
     land_albedo
         Of land that the file, if any, knows no albedo of, in all bands but C07. [-]
     sea_ice_albedo, snow_albedo
@@ -53,13 +58,14 @@ def surface_albedo(
         Where an albedo is missing, or the file does not reach as far as the columns that need it.
     """
     solar = tuple(band for band in bands if band not in THERMAL)
-    check_ground(model, bands, albedo, ocean_albedo, emissivity, land_albedo)
+    check_ground(model, bands, albedo, ocean_albedo, emissivity, land_albedo, ocean_wind)
     check_ice_albedo(sea_ice_albedo, "sea ice")
     check_ice_albedo(snow_albedo, "snow")
     attributes: dict[str, str | int] = {}
     found = {}
     if solar:
-        values, sources, counts = _solar_albedo(model, solar, albedo, ocean_albedo, land_albedo)
+        of_water = _albedo_of_water(model, solar, ocean_albedo, ocean_wind)
+        values, sources, counts = _solar_albedo(model, solar, albedo, of_water, land_albedo)
         ice = with_snow_and_ice(values, model, solar, sea_ice_albedo, snow_albedo)
         values = ice[0]
         attributes |= {"surface_albedo_source": "; ".join(sources + ice[1]), **counts, **ice[2]}
@@ -74,27 +80,45 @@ def _solar_albedo(
     model: xr.Dataset,
     bands: tuple[str, ...],
     albedo: xr.Dataset | None,
-    ocean_albedo: float | None,
+    of_water: tuple[float | np.ndarray, str] | None,
     land_albedo: LandAlbedo | None,
 ) -> tuple[np.ndarray, list[str], dict[str, int]]:
-    """Albedo in bands of sunlight alone (band, y, x), whence it is, and of how many columns."""
+    """Albedo in bands of sunlight alone (band, y, x), whence it is, and of how many columns.
+
+    That of water is known with what it is called, or not at all.
+    """
     shape = (len(bands), model.sizes["y"], model.sizes["x"])
     values, sources, counts = np.full(shape, np.nan), [], {}
     water = _water(model)
     if albedo is not None:
-        spared = water if water is not None and ocean_albedo is not None else np.zeros(1, bool)
+        spared = water if water is not None and of_water is not None else np.zeros(1, bool)
         needed = np.broadcast_to(~spared, shape[1:])
         values, sources, counts = albedo_of_file(model, bands, albedo, needed)
-    if ocean_albedo is not None:
+    if of_water is not None:
         missing = np.isnan(values).all(axis=0)
-        values = np.where(missing if water is None else water, ocean_albedo, values)
+        values = np.where(missing if water is None else water, of_water[0], values)
         place = "water" if water is not None else "all columns" if albedo is None else "the rest"
-        sources.append(f"{place} {ocean_albedo:g}")
+        sources.append(f"{place} {of_water[1]}")
     if land_albedo is not None:
         land = np.full(shape[1:], True) if water is None else ~water
         values, source, filled = with_last_resort(values, model, land, land_albedo)
         sources, counts = [*sources, source], counts | filled
     return values, sources, counts
+
+
+def _albedo_of_water(
+    model: xr.Dataset,
+    bands: tuple[str, ...],
+    ocean_albedo: float | None,
+    ocean_wind: OceanWind | None,
+) -> tuple[float | np.ndarray, str] | None:
+    """Albedo of open water, one number or (band, y, x) [-], and what to call it."""
+    if ocean_wind is None:
+        return None if ocean_albedo is None else (ocean_albedo, f"{ocean_albedo:g}")
+    check_ocean_wind(ocean_wind, model)
+    wind, _ = wind_speed(model, ocean_wind)
+    name = "the model's" if ocean_wind == FROM_MODEL else f"{ocean_wind:g} m/s"
+    return np.stack([sea_albedo(band, wind) for band in bands]), f"rough by a wind of {name}"
 
 
 def check_ground(
@@ -104,8 +128,10 @@ def check_ground(
     ocean_albedo: float | None,
     emissivity: Emissivity | None = None,
     land_albedo: LandAlbedo | None = None,
+    ocean_wind: OceanWind | None = None,
 ) -> None:
-    """Raise `InputError` where there is no albedo, or the file's cells do not cover the scene.
+    """Raise `InputError` where there is no albedo, or two, or the file's cells do not cover the
+    scene.
 
     Parameters
     ----------
@@ -122,20 +148,25 @@ def check_ground(
         Of the ground in C07, needed there.
     land_albedo
         If given, what the file does not reach needs none. [-]
+    ocean_wind
+        If given, that of water follows from it. [m s-1]
     """
     check_land_albedo(land_albedo)
     if set(bands) & set(THERMAL):
         check_emissivity(emissivity)
     if set(bands) <= set(THERMAL):
         return
-    if albedo is None and ocean_albedo is None and land_albedo is None:
+    if ocean_albedo is not None and ocean_wind is not None:
+        raise InputError("water has an albedo or a wind from which it follows; give one of them.")
+    water_known = ocean_albedo is not None or ocean_wind is not None
+    if albedo is None and not water_known and land_albedo is None:
         raise InputError(
             "the ground has no albedo; name an albedo file, an albedo of the ocean, or both, or, "
             "for want of a file, an albedo of land."
         )
     if albedo is None or land_albedo is not None:
         return
-    water = _water(coordinates) if ocean_albedo is not None else None
+    water = _water(coordinates) if water_known else None
     needed = np.full(coordinates["latitude"].shape, True) if water is None else ~water
     if not needed.any():
         return

@@ -8,7 +8,7 @@ import xarray as xr
 
 from ..files import InputError
 from ..nomenclature import QUALITY_FLAGS
-from ..ranges import STATE, WEATHER, Range
+from ..ranges import FINITE, STATE, WEATHER, Range
 from .species import classes_of, species_of
 
 _OF_PLUMES = (
@@ -24,7 +24,9 @@ _OF_GASES = "vapour", "ozone", "carbon_dioxide", "methane", "nitrous_oxide"
 # What a scenario may have.
 _OPTIONAL = {name: WEATHER[name] for name in ("temperature", "surface_temperature")}
 _OPTIONAL |= {name: STATE[name] for name in _OF_GASES}
-_OPTIONAL["fire_fraction"] = STATE["fraction"]
+_OPTIONAL |= {"fire_fraction": STATE["fraction"], "water_share": STATE["fraction"]}
+_OPTIONAL |= {"wind_speed": WEATHER["wind_speed"]}
+_OPTIONAL |= dict.fromkeys(("volume_kernel_weight", "geometric_kernel_weight"), FINITE)
 
 
 class Requirement(NamedTuple):

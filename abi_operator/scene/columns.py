@@ -8,9 +8,12 @@ import xarray as xr
 
 from ..atmosphere import Atmosphere, Fire, Gases, Hydrometeor, LiquidCloud, MiePlume, Plume, State
 from ..bands import GRASSO2013, check_bands
+from ..files.mcd43 import KERNELS
 from ..geometry import Geometry
-from ..nomenclature import PLUME
+from ..nomenclature import GROUND, PLUME
+from ..radiance import THERMAL
 from .cloud_optics import cloud_optics_of, ice_optics_of
+from .grounds import land_and_sea
 from .species import classes_of, species_of
 from .sun import spherical_somewhere
 
@@ -34,13 +37,13 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     -------
     State
         NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
-        faster. Gases, temperatures, hydrometeors and fires are those that the scenario has, and
+        faster. Gases, temperatures, hydrometeors, anisotropic grounds and fires are those that the
+        scenario has, and
         clouds scatter as its attributes say (`cloud_optics_of`, `ice_optics_of`), through which a
         low sun, where there is one, shines likewise (`spherical_somewhere`).
     """
     bands = check_bands(bands, [str(band) for band in scenario["band"].values])
     reader = _Reader(scenario)
-    surface_albedo = reader.by_band("surface_albedo", bands)
     angles = {
         name: np.radians(reader.values(f"{name}_angle"))
         for name in ("solar_zenith", "view_zenith", "relative_azimuth")
@@ -79,7 +82,7 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     )
     return State(
         atmosphere,
-        surface_albedo,
+        _grounds(reader, bands),
         Geometry(**angles, spherical=spherical_somewhere(scenario, angles["solar_zenith"])),
         surface_temperature=reader.optional("surface_temperature"),
         fire=_fire(reader) if "fire_fraction" in scenario else None,
@@ -113,6 +116,10 @@ class _Reader:
         values = np.asarray(array.values, np.float64)
         return values.reshape(-1, *array.shape[len(self._horizontal) :])
 
+    def has(self, name: str) -> bool:
+        """Whether there is such a variable."""
+        return name in self._dataset
+
     def optional(self, name: str, *dims: str) -> Any:
         """As `values`, or None where there is no such variable."""
         return self.values(name, *dims) if name in self._dataset else None
@@ -120,6 +127,21 @@ class _Reader:
     def by_band(self, name: str, bands: tuple[str, ...]) -> dict[str, Any]:
         """A variable in each band, (column,)."""
         return {band: self.values(name, band=band) for band in bands}
+
+
+def _grounds(reader: _Reader, bands: tuple[str, ...]) -> dict[str, Any]:
+    """Albedo by band, or where the scenario has anisotropic grounds those of all columns."""
+    found = reader.by_band("surface_albedo", bands)
+    if not any(reader.has(name) for name in GROUND):
+        return found
+    none = np.zeros_like(reader.values("solar_zenith_angle"))
+    water, wind = (reader.optional(name) for name in ("water_share", "wind_speed"))
+    water, wind = (none if x is None else x for x in (water, wind))
+    for band in bands:
+        if band not in THERMAL:
+            weights = {x: reader.values(x, band=band) if reader.has(x) else none for x in KERNELS}
+            found[band] = land_and_sea(band, found[band], weights, water, wind)
+    return found
 
 
 def _fire(reader: _Reader) -> Fire:

@@ -18,6 +18,7 @@ from ..planck import brightness_temperature
 from ..radiance import FIRE_BANDS, THERMAL, radiance
 from ..reflectance import brf
 from ..satellites import solar_irradiance
+from .kinds_of_ground import by_kind
 
 # Pixels with one of these flags are not solved; those of a night may shine.
 _UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
@@ -111,7 +112,8 @@ def _of_sunlight(
     values = np.full((len(flags), len(bands)), np.nan)
     if solved.any() and solar:
         index = np.array([bands.index(band) for band in solar])
-        values[np.ix_(solved, index)] = brf(_some(states, solved), solar, **settings)
+        for chosen, some in by_kind(_some(states, solved)):
+            values[np.ix_(np.flatnonzero(solved)[chosen], index)] = brf(some, solar, **settings)
     factor = np.cos(states.geometry.solar_zenith)[:, None] * values
     in_sight = (flags & QUALITY_FLAGS["out_of_sight"]) == 0
     night = ((flags & QUALITY_FLAGS["night"]) > 0) & in_sight

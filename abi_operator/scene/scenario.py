@@ -30,6 +30,7 @@ from .droplet_number import DropletNumber
 from .emissivity import Emissivity
 from .fires import burning_columns
 from .gases import air_fields, check_gases, gases_attribute
+from .grounds import OceanWind, anisotropic_fields
 from .hydrometeors import Hydrometeors, hydrometeor_paths
 from .land import LandAlbedo
 from .snow_and_ice import IceAlbedo
@@ -42,6 +43,7 @@ def scenario(
     *,
     albedo: xr.Dataset | None = None,
     ocean_albedo: float | None = None,
+    ocean_wind: OceanWind | None = None,
     land_albedo: LandAlbedo | None = None,
     sea_ice_albedo: IceAlbedo | None = None,
     snow_albedo: IceAlbedo | None = None,
@@ -76,10 +78,14 @@ def scenario(
     model
         One time of a model Dataset, whole or a block of rows.
     albedo
-        Albedo of the ground as `files.read_mcd43a1` returns it. [-]
+        Albedo of the ground as `files.read_mcd43a1` returns it; with weights of kernels land
+        reflects by them (`surface.RossLi`), without it is Lambertian. [-]
     ocean_albedo
         Albedo of water, or of all that `albedo` lacks where the model has no land mask, in all
         bands but C07. [-]
+    ocean_wind
+        Wind over open water, a number [m s-1] or ``"model"`` for the model's own, by which it
+        glints (`surface.Ocean`), in all bands but C07; in place of `ocean_albedo`.
     land_albedo
         Albedo of land that has none of `albedo`, in all bands but C07: a number, or ``"model"`` for
         the model's own, of all sunlight. [-]
@@ -131,8 +137,8 @@ def scenario(
     -------
     xarray.Dataset
         Variables of `nomenclature.SCENARIO` and of the plumes and, where they are simulated, of
-        `nomenclature.OPTIONAL`, of `nomenclature.FIRE` and of the hydrometeors; coordinates
-        ``band``, ``band_wavelength`` and ``time``.
+        `nomenclature.OPTIONAL`, `nomenclature.GROUND`, `nomenclature.FIRE` and of the
+        hydrometeors; coordinates ``band``, ``band_wavelength`` and ``time``.
         Attributes account for what was assumed, completed and left out (`add_accounts`).
 
     Raises
@@ -161,9 +167,13 @@ def scenario(
         albedo,
         ocean_albedo,
         emissivity,
+        ocean_wind=ocean_wind,
         land_albedo=land_albedo,
         sea_ice_albedo=sea_ice_albedo,
         snow_albedo=snow_albedo,
+    )
+    by_direction, of_grounds = anisotropic_fields(
+        model, bands, albedo, ocean_wind, snow_has_albedo=snow_albedo is not None
     )
     position = {name: model[name].values for name in ("latitude", "longitude")}
     time = model["time"].values
@@ -189,7 +199,7 @@ def scenario(
         "relative_azimuth_angle": angles.relative_azimuth,
         "quality_flag": angle_flags(angles) | no_albedo,
     }
-    fields |= of_air | _paths(condensate, len(added_heights))
+    fields |= by_direction | of_air | _paths(condensate, len(added_heights))
     wavelengths = [BANDS[band].wavelength_um for band in bands]
     dataset = xr.Dataset(
         {name: (_dims(name), field, cf_attributes(name)) for name, field in fields.items()},
@@ -222,6 +232,7 @@ def scenario(
         | attributes
         | assumed
         | ground_sources
+        | of_grounds
         | pressure_range(top_pressure)
         | condensate_account(condensate)
         | negative_account(model)

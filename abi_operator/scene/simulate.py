@@ -23,6 +23,7 @@ from .angles import sun_distance
 from .cloud_optics import cloud_optics_of, ice_optics_of, optics_attributes
 from .columns import column_states, horizontal
 from .gases import check_gases, gases_attribute, gases_of
+from .kinds_of_ground import ground_flags
 from .light import Unheard, light
 from .sun import sun_path_of
 
@@ -112,9 +113,11 @@ def simulate(
 
 
 def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:
-    """Bits of ``quality_flag`` (column) of the states themselves, as `quality_flags` has them."""
+    """Bits of ``quality_flag`` (column) of the states themselves, as `quality_flags` has them, but
+    for those of grounds (`ground_flags`).
+    """
     sun, view = states.geometry.solar_zenith, states.geometry.view_zenith
-    return flags_from(np.asarray(sun), np.asarray(view), share_outside)
+    return flags_from(np.asarray(sun), np.asarray(view), share_outside, ground_flags(states))
 
 
 def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str, np.ndarray]:

@@ -214,8 +214,16 @@ def test_gases_ice_fires_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         file["QICE"][0, 20, :3, :3] = 1e-5
         file["QRAIN"][0, 2, 5:, 5:] = 1e-4
         file["QSNOW"][0, 2, 0, :2] = -1e-9, -2e-9
-    options = ["--albedo", inputs.albedo, "--ocean-albedo", 0.03, "--num-streams", 2]
-    options += ["--bands", "C04,C07", "--emissivity", "open shrubland", "--satellite", "GOES-18"]
+    options = ["--albedo", inputs.albedo, "--ocean-wind", "model", "--num-streams", 2]
+    options += [
+        "--land-kernels",
+        "--bands",
+        "C04,C07",
+        "--emissivity",
+        "open shrubland",
+        "--satellite",
+        "GOES-18",
+    ]
     options += ["--hydrometeors", "ice", "--microphysics", "wsm6", "--time", 0]
     options += ["--fires", inputs.fires]
     out = tmp_path / "out"
@@ -228,6 +236,8 @@ def test_gases_ice_fires_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         "emissivity of the ground in C07: 0.89 (open shrubland) over land, 0.978 over water",
         "temperature of the ground: the model's",
         "not simulated (rain)",
+        "land that reflects by kernels: ",
+        "water that glints: ",
         "fires: 15 in ",
         " share a column with others",
         "snow mixing ratio below 0, taken as 0: in 2 cells, down to -2e-09 kg kg-1",
@@ -421,6 +431,8 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
         (["--variables", "radiances"], "variables ['radiances'] are not those of a result"),
         (["--satellite-longitude", "90"], "GOES-19 without --satellite-longitude, or"),
+        (["--land-kernels"], "kernels of the land are those of an albedo file"),
+        (["--ocean-wind", "gale"], "no wind is known by the name of 'gale'"),
         (["--fires", "none.csv"], "none.csv does not exist"),
         (["--plume-species", "dust"], "'dust' is not one of"),
     ],

@@ -233,3 +233,19 @@ def test_real_file_has_three_broad_bands(sample_data: Path):
     np.testing.assert_array_equal(dataset["albedo_quality"] == 255, np.isnan(albedo))
     with pytest.raises(InputError, match="no BRDF_Albedo_Parameters_Band7; request"):
         read_white_sky(path, ["vis", "Band7"])
+
+
+def test_weights_of_kernels_follow_the_same_regressions(write_albedo_twin):
+    """Together with the albedo they are the weights of the band, whose white-sky albedo it is."""
+    names = ["C01", "C02", "C06"]
+    made = read_mcd43a1(write_albedo_twin(BANDS), names, kernels=True)
+    volume, geometric = (made[f"{x}_kernel_weight"] for x in ("volume", "geometric"))
+    assert volume.dims == made["surface_albedo"].dims
+    for band in names:
+        share = sum(MODIS_TO_ABI[band].weights.values())
+        np.testing.assert_allclose(volume.sel(band=band), 0.05 * share, rtol=ROUNDING)
+        np.testing.assert_allclose(geometric.sel(band=band), 0.01 * share, rtol=ROUNDING)
+    constant = made["surface_albedo"] - 0.189184 * volume + 1.377622 * geometric
+    expected = 0.983 * 0.1 + 0.0018  # of C02, from Band1
+    np.testing.assert_allclose(constant.sel(band="C02"), expected, rtol=ROUNDING)
+    assert "volume_kernel_weight" not in read_mcd43a1(write_albedo_twin(BANDS), names)
