@@ -22,7 +22,9 @@ _MOLE_FRACTIONS = ("carbon_dioxide", "methane", "nitrous_oxide")
 _NO_FIRE = 300.0  # [K]
 
 
-def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> State:
+def column_states(
+    scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013, *, num_streams: int | None = None
+) -> State:
     """State of every column of a scenario, or of a result at one time.
 
     Parameters
@@ -32,6 +34,9 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
         their place.
     bands
         Bands for which albedo and plumes are wanted.
+    num_streams
+        Streams by which anisotropic grounds are integrated (`land_and_sea`); None for those of the
+        result, 8 of a scenario.
 
     Returns
     -------
@@ -82,7 +87,7 @@ def column_states(scenario: xr.Dataset, bands: Sequence[str] = GRASSO2013) -> St
     )
     return State(
         atmosphere,
-        _grounds(reader, bands),
+        _grounds(reader, bands, num_streams or int(scenario.attrs.get("num_streams", 8))),
         Geometry(**angles, spherical=spherical_somewhere(scenario, angles["solar_zenith"])),
         surface_temperature=reader.optional("surface_temperature"),
         fire=_fire(reader) if "fire_fraction" in scenario else None,
@@ -129,7 +134,7 @@ class _Reader:
         return {band: self.values(name, band=band) for band in bands}
 
 
-def _grounds(reader: _Reader, bands: tuple[str, ...]) -> dict[str, Any]:
+def _grounds(reader: _Reader, bands: tuple[str, ...], num_streams: int) -> dict[str, Any]:
     """Albedo by band, or where the scenario has anisotropic grounds those of all columns."""
     found = reader.by_band("surface_albedo", bands)
     if not any(reader.has(name) for name in GROUND):
@@ -140,7 +145,7 @@ def _grounds(reader: _Reader, bands: tuple[str, ...]) -> dict[str, Any]:
     for band in bands:
         if band not in THERMAL:
             weights = {x: reader.values(x, band=band) if reader.has(x) else none for x in KERNELS}
-            found[band] = land_and_sea(band, found[band], weights, water, wind)
+            found[band] = land_and_sea(band, found[band], weights, water, wind, num_streams)
     return found
 
 

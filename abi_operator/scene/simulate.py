@@ -86,7 +86,7 @@ def simulate(
     gases = gases_of(scenario) if gases is None else check_gases(tuple(gases))
     if gases and "vapour" not in scenario:
         raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
-    states = column_states(scenario, bands)
+    states = column_states(scenario, bands, num_streams=num_streams)
     with listening(None if listener is None else Unheard(listener)):
         fields = _optical_depths(states.atmosphere, bands)
     flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
