@@ -1,0 +1,16 @@
+"""Experiments: what a retrieval can do, and under which conditions it no longer can.
+
+Each is a function of a size and a seed that makes up its pixels, retrieves them in float64, and
+returns a Dataset with the table and all that its picture is drawn from; beside it stands the
+function that draws. `EXPERIMENTS` names them for the command `abi-operator experiment`.
+"""
+
+from .experiment import Experiment as Experiment
+from .known_albedo import draw_known_albedo as draw_known_albedo
+from .known_albedo import known_albedo as known_albedo
+from .tables import format_table as format_table
+
+EXPERIMENTS = {
+    "albedo": Experiment(known_albedo, draw_known_albedo),
+}
+"""By the name that the command knows them by."""
