@@ -6,11 +6,14 @@ function that draws. `EXPERIMENTS` names them for the command `abi-operator expe
 """
 
 from .experiment import Experiment as Experiment
+from .independent_truth import draw_independent_truth as draw_independent_truth
+from .independent_truth import independent_truth as independent_truth
 from .known_albedo import draw_known_albedo as draw_known_albedo
 from .known_albedo import known_albedo as known_albedo
 from .tables import format_table as format_table
 
 EXPERIMENTS = {
     "albedo": Experiment(known_albedo, draw_known_albedo),
+    "truth": Experiment(independent_truth, draw_independent_truth),
 }
 """By the name that the command knows them by."""
