@@ -10,10 +10,13 @@ from .independent_truth import draw_independent_truth as draw_independent_truth
 from .independent_truth import independent_truth as independent_truth
 from .known_albedo import draw_known_albedo as draw_known_albedo
 from .known_albedo import known_albedo as known_albedo
+from .saturated_fires import draw_saturated_fires as draw_saturated_fires
+from .saturated_fires import saturated_fires as saturated_fires
 from .tables import format_table as format_table
 
 EXPERIMENTS = {
     "albedo": Experiment(known_albedo, draw_known_albedo),
     "truth": Experiment(independent_truth, draw_independent_truth),
+    "fires": Experiment(saturated_fires, draw_saturated_fires),
 }
 """By the name that the command knows them by."""
