@@ -65,6 +65,15 @@ def checked(
         too_few = observations.num_values < forward.vector.size
         codes[too_few] = ResultCode.TOO_FEW_BANDS
     wrong = (sigma <= 0) | (np.isnan(sigma) & np.isfinite(measured)) | too_bright
+    correlation = observations.correlation
+    if correlation is not None:
+        correlation = np.asarray(correlation, dtype)
+        if correlation.shape != (*measured.shape, len(bands)):
+            raise ValueError(
+                f"correlation of the observations has the shape {correlation.shape}; it needs one "
+                f"matrix of {len(bands)} x {len(bands)} for each of {num_pixels} pixels."
+            )
+        wrong[~_positive(correlation, present)] = True
     codes[wrong.any(axis=1) | ~present.any(axis=1)] = ResultCode.INVALID_INPUT
     measured = np.where((codes == ResultCode.SUCCESS)[:, None], measured, np.nan)
     saturated = observations.saturated
@@ -75,5 +84,19 @@ def checked(
         np.where(sigma > 0, sigma, 1),
         np.asarray(saturated),
         observations.sun_distance,
+        correlation,
     )
     return codes, kept, prior
+
+
+def _positive(correlation: np.ndarray, present: np.ndarray) -> np.ndarray:
+    """Whether a matrix is one of correlations, among the bands that count, pixel by pixel."""
+    both = present[:, :, None] & present[:, None, :]
+    among = np.where(both, correlation, np.eye(correlation.shape[-1]))
+    fine = np.asarray(np.isfinite(among).all(axis=(1, 2)))
+    among = np.where(fine[:, None, None], among, np.eye(correlation.shape[-1]))
+    wrong = np.maximum(
+        np.abs(np.diagonal(among, axis1=1, axis2=2) - 1).max(axis=1),
+        np.abs(among - np.swapaxes(among, 1, 2)).max(axis=(1, 2)),
+    )
+    return np.asarray(fine & (wrong < 1e-6) & (np.linalg.eigvalsh(among).min(axis=1) > 0))

@@ -53,12 +53,18 @@ class Observation(eqx.Module):
         Which bands are saturated; their `measured` is the ceiling. None if none is.
     sun_distance
         Distance of the sun [AU], None for 1 (`ForwardModel.measured`).
+    correlation
+        Of the errors of the bands with each other, 1 on its diagonal; None where they are
+        independent, as noise is. What a forward model is wrong by is not. With its Cholesky factor
+        L, residuals are :math:`L^{-1}` times the departures in standard deviations; bands that are
+        missing or saturated have no part in it. [-]
     """
 
     measured: Float[Array | np.ndarray, "*batch band"]
     sigma: Float[Array | np.ndarray, "*batch band"]
     saturated: Bool[Array | np.ndarray, "*batch band"] | None = None
     sun_distance: Float[Array | np.ndarray, "*batch"] | None = None
+    correlation: Float[Array | np.ndarray, "*batch band band"] | None = None
 
     @property
     def present(self) -> Bool[Array, "*batch band"]:
@@ -96,7 +102,28 @@ class Observation(eqx.Module):
         departure = (predicted - measured) / sigma
         if self.saturated is not None:
             departure = jnp.where(jnp.asarray(self.saturated), _censored(departure), departure)
-        return jnp.where(present, departure, 0)
+        departure = jnp.where(present, departure, 0)
+        if self.correlation is None:
+            return departure
+        root = jnp.asarray(self.root_correlation, predicted.dtype)
+        root = jnp.broadcast_to(root, (*departure.shape, departure.shape[-1]))
+        solved = jax.lax.linalg.triangular_solve(
+            root, departure[..., None], left_side=True, lower=True
+        )
+        return solved[..., 0]
+
+    @property
+    def root_correlation(self) -> Float[Array, "*batch band band"]:
+        """Cholesky factor of the correlation of the bands that are values; others stand alone."""
+        values = self.present
+        if self.saturated is not None:
+            values = values & ~jnp.asarray(self.saturated)
+        unit = jnp.broadcast_to(jnp.eye(values.shape[-1]), (*values.shape, values.shape[-1]))
+        if self.correlation is None:
+            return unit
+        both = values[..., :, None] & values[..., None, :]
+        correlation = jnp.asarray(self.correlation)
+        return jnp.linalg.cholesky(jnp.where(both, correlation, unit.astype(correlation.dtype)))
 
 
 def _censored(departure: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
@@ -142,7 +169,7 @@ def measurement(
     imager: Imager = IMAGER,
     *,
     calibration: bool = False,
-    forward_error: float = 0.0,
+    forward_error: float | Float[np.ndarray, "band band"] = 0.0,
     sun_distance: Float[ArrayLike, "*batch"] | None = None,
 ) -> Observation:
     """An observation with the noise and the ceilings of the instrument.
@@ -158,7 +185,8 @@ def measurement(
         Whether the uncertainty of the calibration is part of sigma, as an error that is another one
         in every pixel and band.
     forward_error
-        Relative standard deviation of what the forward model itself is wrong by, in each band. [-]
+        Relative standard deviation of what the forward model itself is wrong by, in each band, or
+        the relative covariance of that, band by band, which makes errors of bands correlated. [-]
     sun_distance
         Distance of the sun, None for 1. [AU]
     """
@@ -175,9 +203,15 @@ def measurement(
     saturated = values >= tops
     values = np.where(saturated, tops, values)
     columns = [noise_sigma(values[..., i], band, imager) for i, band in enumerate(bands)]
-    other = np.hypot(relative, forward_error).astype(values.dtype) * values
-    sigma = np.hypot(np.stack(columns, axis=-1), other)
-    return Observation(values, sigma, saturated, distance)
+    noise = np.stack(columns, axis=-1)
+    if np.ndim(forward_error) == 0:
+        other = np.hypot(relative, forward_error).astype(values.dtype) * values
+        return Observation(values, np.hypot(noise, other), saturated, distance)
+    covariance = values[..., :, None] * np.asarray(forward_error) * values[..., None, :]
+    covariance += (noise**2 + (relative * values) ** 2)[..., None] * np.eye(len(bands))
+    sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)).astype(values.dtype)
+    correlation = (covariance / (sigma[..., :, None] * sigma[..., None, :])).astype(values.dtype)
+    return Observation(values, sigma, saturated, distance, correlation)
 
 
 def add_noise(reflectance_factor: xr.DataArray, seed: int, imager: Imager = IMAGER) -> xr.DataArray:

@@ -169,18 +169,20 @@ def _estimate(
         smoothing = lack @ prior.S_prior @ lack.T
         _, determinant = jnp.linalg.slogdet(prior.S_prior @ inverse)
         information = determinant / (2 * jnp.log(2.0).astype(x.dtype))
+    # Whitened is the inverse of this, the root of S_obs, times what is measured.
     sigma = jnp.where(observation.present, jnp.asarray(observation.sigma, x.dtype), 1)
+    root = sigma[:, None] * jnp.asarray(observation.root_correlation, x.dtype)
     errors = jnp.zeros((0, size), x.dtype)
     if about is not None:
         errors = jnp.abs(gain @ of_parameters).T * jnp.sqrt(jnp.diagonal(about.S_prior))[:, None]
     return Estimate(
-        jacobian=jacobian * sigma[:, None],
+        jacobian=root @ jacobian,
         posterior_covariance=covariance,
         noise_covariance=gain @ gain.T,
         smoothing_covariance=smoothing,
         parameter_error=errors,
         averaging_kernel=kernel,
-        gain=gain / sigma,
+        gain=jax.scipy.linalg.solve_triangular(root, gain.T, trans=1, lower=True).T,
         degrees_of_freedom=jnp.trace(kernel),
         information_content=information,
         residual=residual,

@@ -97,3 +97,19 @@ def test_single_precision_converges_as_double_does(veiled):
     assert found.inversion.converged.all() and alone.inversion.converged.all()
     assert set(alone.codes) == {ResultCode.SUCCESS}
     np.testing.assert_allclose(optical_depth(alone), truth, rtol=2e-4)
+
+
+def test_correlations_are_correlations():
+    observation, ground, _ = veiled_pixels()
+    correlation = np.broadcast_to(np.eye(3), (12, 3, 3)).copy()
+    correlation[0, 0, 1] = 0.5  # not symmetric
+    correlation[1] = 1.5 - 0.5 * np.eye(3)  # not positive
+    correlation[2, 1, 1] = 2.0
+    correlation[3, 0, 0] = np.nan
+    wrong = Observation(observation.measured, observation.sigma, correlation=correlation)
+    found = retrieve_pixels(VEIL, wrong, ground, exact=True)
+    assert set(found.codes[:4]) == {ResultCode.INVALID_INPUT}
+    assert set(found.codes[4:]) == {ResultCode.SUCCESS}
+    short = Observation(observation.measured, observation.sigma, correlation=correlation[0])
+    with pytest.raises(ValueError, match="correlation of the observations has the shape"):
+        retrieve_pixels(VEIL, short, ground, exact=True)

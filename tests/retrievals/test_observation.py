@@ -65,6 +65,30 @@ def test_calibration_and_forward_error_add_in_squares():
     np.testing.assert_allclose(worse.sigma, expected, rtol=1e-12)
 
 
+def test_errors_of_a_forward_model_go_together():
+    """Residuals are those of a normal distribution with the covariance written out."""
+    relative = np.diag([0.02, 0.03, 0.05]) @ np.array([[1, 0.9, 0.4], [0.9, 1, 0.2], [0.4, 0.2, 1]])
+    relative = relative @ np.diag([0.02, 0.03, 0.05])
+    seen = np.array([[0.2, 0.3, 0.4], [0.1, np.nan, 0.3]])
+    plain = measurement(seen, BANDS)
+    found = measurement(seen, BANDS, forward_error=relative)
+    predicted = jnp.array([[0.21, 0.29, 0.43], [0.11, 0.2, 0.27]])
+    residual = found.residual(predicted)
+    for row, there in enumerate(np.isfinite(seen)):
+        y = seen[row, there]
+        S = np.diag(plain.sigma[row, there] ** 2) + np.outer(y, y) * relative[np.ix_(there, there)]
+        departure = np.asarray(predicted)[row, there] - y
+        expected = departure @ np.linalg.solve(S, departure)
+        np.testing.assert_allclose(np.sum(residual[row] ** 2), expected, rtol=1e-10)
+        np.testing.assert_allclose(found.sigma[row, there] ** 2, np.diagonal(S), rtol=1e-12)
+    assert residual[1, 1] == 0
+    one = jax.tree.map(lambda leaf: leaf[0], found)  # several guesses of one pixel, as of a scan
+    several = one.residual(jnp.stack([predicted[0]] * 2))
+    np.testing.assert_allclose(several, jnp.stack([residual[0]] * 2), rtol=1e-14)
+    alone = measurement(seen, BANDS, forward_error=np.zeros((3, 3)))
+    np.testing.assert_allclose(alone.residual(predicted), plain.residual(predicted), rtol=1e-12)
+
+
 def test_missing_bands_do_not_count():
     observation = Observation(
         jnp.array([0.2, np.nan, 0.3, 0.4]), jnp.array([0.1, 0.1, np.inf, np.nan])

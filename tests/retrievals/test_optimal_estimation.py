@@ -34,7 +34,8 @@ def diagnosed():
     observation, ground, truth = veiled_pixels()
     sigma = observation.sigma.copy()
     sigma[3, 1] = np.inf
-    observation = Observation(observation.measured, sigma)
+    correlation = np.broadcast_to(0.6 * np.eye(3) + 0.4, (12, 3, 3))
+    observation = Observation(observation.measured, sigma, correlation=correlation)
     x = np.asarray(TWO.vector.x(truth, 0.01)) + 0.05
     prior = Prior(np.array([-2.5, 0.0]), np.array([[0.8, 0.01], [0.01, 0.0025]]))
     return estimates(TWO, observation, ground, x, prior, GROUND), observation, ground, x, prior
@@ -47,7 +48,8 @@ def test_diagnostics_are_their_formulas(diagnosed, index):
     one = jax.tree.map(lambda leaf: leaf[index], found)
     counts = np.isfinite(observation.sigma[index])
     K = np.asarray(jax.jacfwd(lambda x: TWO(x, ground[index]))(jnp.asarray(x[index])))[counts]
-    S_obs = np.diag(observation.sigma[index][counts] ** 2)
+    sigma = observation.sigma[index][counts]
+    S_obs = np.outer(sigma, sigma) * observation.correlation[index][np.ix_(counts, counts)]
     S_prior = prior.S_prior
     S_hat = np.linalg.inv(K.T @ np.linalg.inv(S_obs) @ K + np.linalg.inv(S_prior))
     G = S_hat @ K.T @ np.linalg.inv(S_obs)
@@ -85,7 +87,8 @@ def test_the_linearity_test_sees_curvature(diagnosed):
     for step in [*(axes * np.sqrt(variances)).T, *-(axes * np.sqrt(variances)).T]:
         moved = np.asarray(TWO(jnp.asarray(x[0] + step), ground[0]))
         linear = here + found.jacobian[0] @ step
-        departures.append(np.sum(((moved - linear) / observation.sigma[0]) ** 2))
+        departure = (moved - linear) / observation.sigma[0]
+        departures.append(departure @ np.linalg.solve(observation.correlation[0], departure))
     np.testing.assert_allclose(found.nonlinearity[0], max(departures), rtol=1e-6)
 
 

@@ -1,0 +1,22 @@
+"""Experiments: what a retrieval can do, and under which conditions it no longer can.
+
+Each is a function of a size and a seed that makes up its pixels, retrieves them in float64, and
+returns a Dataset with the table and all that its picture is drawn from; beside it stands the
+function that draws. `EXPERIMENTS` names them for the command `abi-operator experiment`.
+"""
+
+from .experiment import Experiment as Experiment
+from .independent_truth import draw_independent_truth as draw_independent_truth
+from .independent_truth import independent_truth as independent_truth
+from .known_albedo import draw_known_albedo as draw_known_albedo
+from .known_albedo import known_albedo as known_albedo
+from .saturated_fires import draw_saturated_fires as draw_saturated_fires
+from .saturated_fires import saturated_fires as saturated_fires
+from .tables import format_table as format_table
+
+EXPERIMENTS = {
+    "albedo": Experiment(known_albedo, draw_known_albedo),
+    "truth": Experiment(independent_truth, draw_independent_truth),
+    "fires": Experiment(saturated_fires, draw_saturated_fires),
+}
+"""By the name that the command knows them by."""
