@@ -22,14 +22,16 @@ import typer
 
 from . import _ending
 from ._version import __version__
+from .bands import GRASSO2013
 from .commands import one_sentence, typed, user_warnings
 from .demo import write_demo
 from .files import output_folder
 from .guard.commands import jacobian
 from .machine import kept
 from .machine.speed import default_cache_folder, use_compilation_cache, use_compiler_flags
+from .sensitivity.commands import nir_test
 from .simulate_command import print_report, simulate
-from .simulation import Request, open_scene, pictures_of_before, simulate_scene
+from .simulation import Request, Species, open_scene, pictures_of_before, simulate_scene
 
 COMMANDS = "abi_operator.commands"
 """Group of the entry points by which other packages add commands."""
@@ -47,6 +49,9 @@ def demo(
     size: Annotated[int, typer.Option(min=8, help="Rows and columns of the scene.")] = 64,
     out: Annotated[Path, typer.Option(help="Folder for inputs and results.")] = Path("abi-demo"),
     seed: Annotated[int, typer.Option(min=0, help="Another seed is another coast.")] = 0,
+    plume: Annotated[
+        Species, typer.Option(help="What the plumes are made of; ash, at 8 to 11 km.")
+    ] = Species.SMOKE,
 ) -> None:
     """Make up a smoky Californian coast and simulate it: a first run, which needs no files.
 
@@ -54,7 +59,8 @@ def demo(
     takes them, into the folder inputs, and beside it result.nc and a picture of it in natural
     colours. Where the retrievals are installed, which come with this package, the smoke is then
     retrieved from the simulated image and compared with the smoke that was made up (retrieval.nc,
-    scores.csv).
+    scores.csv). With --plume ash the same plumes are of volcanic ash, for `abi-operator nir-test`;
+    none is retrieved.
     """
     with one_sentence(), user_warnings():
         before = pictures_of_before(out)
@@ -67,12 +73,16 @@ def demo(
                 inputs.albedo,
                 _DEMO_OCEAN_ALBEDO,
                 inputs.plume,
+                plume_species=plume,
+                bands=GRASSO2013 if plume == Species.SMOKE else (*GRASSO2013, "green"),
                 gases=(),
                 error_budget=None,
             )
             request = request._replace(command=typed(context))
             report = simulate_scene(open_scene(request), folder)
         print_report(report, out, before)
+    if plume != Species.SMOKE:
+        return
     for entry in entry_points(group=COMMANDS, name="demo"):
         finish_demo = _load(entry)
         if finish_demo is not None:
@@ -120,6 +130,7 @@ def make_app(prepare: Callable[[bool], None] = lambda keep_programs: None) -> ty
 
     app.command()(simulate)
     app.command()(demo)
+    app.command()(nir_test)
     app.add_typer(jacobian, name="jacobian")
     for entry in sorted(entry_points(group=COMMANDS), key=lambda entry: entry.name):
         command = None if entry.name == "demo" else _load(entry)

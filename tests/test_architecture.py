@@ -12,7 +12,7 @@ FLOORS = [
     {"__main__"},
     {"cli"},
     {"simulate_command"},
-    {"guard", "simulation"},
+    {"guard", "sensitivity", "simulation"},
     {"commands", "demo", "drawing", "report", "request"},
     {"scene"},
     {"files", "instrument", "pictures", "products"},

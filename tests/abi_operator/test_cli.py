@@ -164,6 +164,24 @@ def test_simulate_does_what_demo_does(invoke, tmp_path, inputs):
             np.testing.assert_array_equal(ours["brf"], theirs["brf"])
 
 
+def test_the_demonstration_can_be_of_ash(invoke, tmp_path):
+    """With light of 0.555 um, and without a retrieval of smoke."""
+
+    class Entry(EntryPoint):
+        def load(self):
+            raise AssertionError("smoke is retrieved of ash")
+
+    entry = Entry("demo", "retrievals.commands:finish_demo", "abi_operator.commands")
+    outcome = invoke("demo", "--plume", "ash", "--size", SIZE, "--out", tmp_path, entries=[entry])
+    assert outcome.exit_code == 0 and outcome.stderr == "", outcome.output
+    assert "plume of ash: 16 of 64 columns, optical depth at 550 nm up to 2, 8 to 11 km" in (
+        outcome.output
+    )
+    with read_result(tmp_path / "result.nc") as result:
+        assert result["band"].values.tolist() == ["C01", "C02", "C03", "C06", "green"]
+        assert "smoke_brightness" not in result and result["ash_aod_550"].max() <= 2.0
+
+
 def test_ash_and_bands_can_be_asked_for(invoke, tmp_path, inputs):
     options = ["--plume", inputs.plume, "--plume-species", "ash", "--plume-aod", 0.5]
     options += ["--bands", "C01, C06", "--num-streams", 2, "--satellite-longitude", -137]
