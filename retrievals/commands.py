@@ -10,7 +10,7 @@ import xarray as xr
 
 from abi_operator.bands import check_bands
 from abi_operator.commands import one_sentence, typed
-from abi_operator.files import InputError, output_folder, read_result
+from abi_operator.files import InputError, output_folder, read_result, reading
 from abi_operator.radiance import FIRE_BANDS
 
 from .fires import BACKGROUNDS
@@ -109,7 +109,7 @@ def retrieve(
     how: dict[str, Any] = {} if background is None else {"background": background}
     how |= {} if where is None else {"where": where}
     how |= {} if smooth is None else {"smooth": smooth}
-    with one_sentence(), read_result(result) as dataset:
+    with one_sentence(), reading(str(result)), read_result(result) as dataset:
         retrieval = retrieve_kind(
             dataset,
             kind,
@@ -166,7 +166,12 @@ def score(
     ] = None,
 ) -> None:
     """Score a retrieval against the truth that was specified."""
-    with one_sentence(), read_result(result) as truth, _open_retrieval(retrieval) as retrieved:
+    with (
+        one_sentence(),
+        reading(f"{result} or {retrieval}"),
+        read_result(result) as truth,
+        _open_retrieval(retrieval) as retrieved,
+    ):
         report = score_retrieval(truth, retrieved)
         if csv is not None:
             with output_folder(csv.absolute().parent) as folder:
@@ -231,7 +236,7 @@ def _open_retrieval(path: Path) -> xr.Dataset:
         raise InputError(f"{path} does not exist or is not a file; check the path.")
     try:
         dataset = xr.open_dataset(path, engine="netcdf4", decode_timedelta=False)
-    except (OSError, ValueError, RuntimeError) as error:
+    except (OSError, ValueError, RuntimeError, TypeError, AttributeError) as error:
         raise InputError(f"{path} cannot be read as NetCDF ({error}).") from error
     if "result_code" not in dataset:
         dataset.close()

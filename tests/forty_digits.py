@@ -160,18 +160,26 @@ def _scaled(column: tuple, secant, planck_levels, num_streams: int, delta_m: boo
     return out
 
 
-def _direct(scaled: list[tuple], ground, corrected: bool, sun: arb, view: arb, azimuth: arb) -> arb:
-    """Light scattered once or reflected once, exactly, for an irradiance of pi."""
+def _direct(
+    scaled: list[tuple], ground, corrected: bool, sun: arb, view: arb, azimuth: arb, exact=None
+) -> arb:
+    """Light scattered once or reflected once, exactly, for an irradiance of pi.
+
+    `exact` is the phase function of each layer, None for the sum of its moments.
+    """
     angle = -view * sun
     angle -= (1 - view * view).sqrt() * (1 - sun * sun).sqrt() * azimuth.cos()
-    degrees = range(len(scaled[0][2]) if corrected else 0)
+    degrees = range(len(scaled[0][2]) if corrected and exact is None else 0)
     # Not by recursion, in which balls grow by a digit in three degrees.
     polynomials = [(2 * degree + 1) * angle.legendre_p(degree) for degree in degrees]
     total, passed = arb(0), arb(0)
-    for layer, ratio, chi in scaled:
+    for i, (layer, ratio, chi) in enumerate(scaled):
         both = 1 / view + layer.secant
         if corrected:
-            phase = sum((p * c for p, c in zip(polynomials, chi, strict=True)), arb(0))
+            if exact is None:
+                phase = sum((p * c for p, c in zip(polynomials, chi, strict=True)), arb(0))
+            else:
+                phase = arb(float(exact[i]))
             part = (-passed).exp() * -(-both * layer.tau).expm1() / both
             total += ratio * phase * part / (4 * view)
         passed += both * layer.tau
@@ -198,12 +206,14 @@ def forty_digit_radiance(
     isotropic_top=0.0,
     secant=None,
     delta_m=True,
+    phase_function=None,
 ):
     """Radiance at the top of one column in the units of its sources.
 
     `moments` has axes ``layer moment``; `mu` and `relative_azimuth` are numbers or lists of views.
     `albedo` is a number or a `Ground`, `secant` replaces 1/mu0 in each layer's attenuation of the
-    sun, and `corrected` adds the exact single scattering. Numbers enter as float64, exactly.
+    sun, and `corrected` adds the exact single scattering, of one view that of `phase_function`
+    where it is given. Numbers enter as float64, exactly.
     """
     before, ctx.prec = ctx.prec, BITS
     try:
@@ -224,7 +234,7 @@ def forty_digit_radiance(
         layers = [layer for layer, *_ in scaled]
         # Sunlight so far for an irradiance of pi.
         solar = [
-            _direct(scaled, albedo, corrected, sun, view, azimuth)
+            _direct(scaled, albedo, corrected, sun, view, azimuth, phase_function)
             for view, azimuth in zip(views, azimuths, strict=True)
         ]
         thermal = [arb(0)] * len(views)

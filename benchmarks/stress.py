@@ -1,0 +1,298 @@
+"""Does the solver hold at the extremes? Random columns, each asked everything that can be asked.
+
+    python benchmarks/stress.py [--columns 20000] [--precision float64] [--judged 24] [--folder F]
+
+Columns are those of `stress_columns`, checks those of `stress_checks`. Streams are 2 to 8 in 95 %
+of the columns, 16 in 4.5 %, 32 in 0.45 %, 64 in 0.05 %; layers up to 1, 4, 16, 64 and 200. Each
+batch is a file of the folder, made from its name alone: a run that was stopped goes on with what
+is missing, and the bytes are the same. The folder has one in it for each state of the code. Every
+core has a process of its own. The worst columns are solved with 40 digits (`stress_truth`).
+
+`--columns 1000000` is the long run; how long it would take is printed, but for compiling, which is
+done once. Exits with 1 where a check failed.
+"""
+
+import argparse
+import hashlib
+import os
+import sys
+import tempfile
+import time
+from multiprocessing import get_context
+from pathlib import Path
+
+import jax
+import numpy as np
+import stress_truth
+from rounds import table
+from stress_checks import CHECKS, LIMITS, Judged, refused
+from stress_columns import SEED, STRATA, draw
+
+import abi_operator
+from abi_operator import use_compilation_cache
+from abi_operator.machine.speed import usable_cores
+
+# Streams, layers at most and at least, whether they emit, columns of a batch, share of all columns.
+# What takes longest to compile comes first.
+GROUPS = (
+    (64, 4, 2, False, 8, 0.0005),
+    (32, 16, 5, False, 51, 0.0045),
+    (16, 16, 5, False, 119, 0.0225),
+    (16, 64, 17, False, 119, 0.0225),
+    (8, 200, 65, False, 510, 0.10),
+    (8, 4, 2, True, 1020, 0.10),
+    (8, 16, 5, False, 1020, 0.15),
+    (4, 16, 5, True, 1020, 0.15),
+    (6, 4, 2, False, 1020, 0.15),
+    (4, 64, 17, False, 1020, 0.10),
+    (2, 16, 5, False, 1020, 0.10),
+    (2, 1, 1, False, 1020, 0.10),
+)
+LONG = 1_000_000
+PRECISIONS = ("float64", "float32")
+# Batches that a process takes at a time.
+PORTION = 40
+FIELDS = [("stratum", "i2"), ("value", "f8"), ("beyond", "?"), *((name, "f8") for name in CHECKS)]
+
+
+def batches(group, columns):
+    """How many of a group; two at least, the first of which compiles."""
+    return max(2, -(-round(columns * group[5]) // group[4]))
+
+
+def columns_of(group, index, precision):
+    streams, layers, fewest, emitting, size, _ = group
+    key = [streams, layers, int(emitting), index]
+    batch = draw(key, size, streams, layers, fewest, emitting)
+    return batch if precision == "float64" else batch.single()
+
+
+def place(folder, group, index, precision):
+    kind = "emitting" if group[3] else "sunlit"
+    return folder / f"{precision}-{group[0]}-{group[1]}-{kind}-{index:05d}.npy"
+
+
+def one_core(cores):
+    """A process for each core, so that several programs compile at once."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {cores.get()})
+    jax.config.update("jax_enable_x64", True)
+    use_compilation_cache()
+
+
+def judge(task):
+    """Write what is missing of some batches of a group; seconds that each of them took."""
+    folder, group, indices, precision = task
+    seconds = []
+    for index in indices:
+        path = place(folder, group, index, precision)
+        if path.exists():
+            continue
+        started = time.perf_counter()
+        batch = columns_of(group, index, precision)
+        judged = Judged(batch.columns, batch.further, group[0], [group[0], index])
+        errors = judged.all()
+        rows = np.zeros(batch.stratum.size, FIELDS)
+        rows["stratum"], rows["value"] = batch.stratum, judged.value
+        rows["beyond"] = judged.beyond(batch.columns["ssa"])
+        for name, found in errors.items():
+            rows[name] = found
+        handle, part = tempfile.mkstemp(dir=folder, suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            np.save(file, rows)
+        os.replace(part, path)
+        seconds.append(time.perf_counter() - started)
+    return group, seconds
+
+
+def state_of_code():
+    """Name of a folder: results of other code are other results."""
+    code = hashlib.sha256()
+    sources = sorted(Path(abi_operator.__file__).parent.rglob("*.py"))
+    own = [Path(__file__).with_name(f"stress_{name}.py") for name in ("columns", "checks")]
+    for path in [*sources, *own]:
+        code.update(path.read_bytes())
+    return code.hexdigest()[:12]
+
+
+def run(folder, columns, precision):
+    """All batches of all groups; seconds of each batch by group."""
+    tasks = []
+    for group in GROUPS:
+        number = batches(group, columns)
+        for start in range(0, number, PORTION):
+            some = range(start, min(start + PORTION, number))
+            tasks.append((folder, group, some, precision))
+    context = get_context("spawn")
+    cores = context.Queue()
+    names = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [0]
+    for core in names:
+        cores.put(core)
+    took = {group: [] for group in GROUPS}
+    with context.Pool(len(names), one_core, (cores,)) as pool:
+        for group, seconds in pool.imap_unordered(judge, tasks, chunksize=1):
+            took[group] += seconds
+            print(f"{time.strftime('%X')} {group[:4]} {len(seconds)} batches", file=sys.stderr)
+    return took
+
+
+def read(folder, columns, precision):
+    """Everything that the batches hold, with the group and the index of every column's batch."""
+    found = []
+    for number, group in enumerate(GROUPS):
+        for index in range(batches(group, columns)):
+            rows = np.load(place(folder, group, index, precision))
+            found.append((rows, np.full((rows.size, 3), (number, index, 0))))
+            found[-1][1][:, 2] = np.arange(rows.size)
+    rows, where = zip(*found, strict=True)
+    return np.concatenate(rows), np.concatenate(where)
+
+
+def failed(rows, name, precision):
+    return np.nan_to_num(rows[name]) > LIMITS[name][PRECISIONS.index(precision)]
+
+
+def by_stratum(rows, precision):
+    names = [name for name in CHECKS if (~np.isnan(rows[name])).any()]
+    print("Columns by stratum, and how many failed each check:\n")
+    beyond = ["beyond single precision"] if precision == "float32" else []
+    lines = []
+    for k, stratum in [*enumerate(STRATA), (None, "all")]:
+        own = rows if k is None else rows[rows["stratum"] == k]
+        counts = [f"{failed(own, name, precision).sum()}" for name in names]
+        more = [f"{own['beyond'].sum()}"] if beyond else []
+        lines.append([stratum, f"{own.size}", *more, *counts])
+    table(["stratum", "columns", *beyond, *names], lines)
+
+
+def by_check(rows, where, precision):
+    print("Errors by check:\n")
+    lines = []
+    for name, meaning in CHECKS.items():
+        asked = ~np.isnan(rows[name])
+        if not asked.any():
+            continue
+        worst = int(np.nanargmax(rows[name]))
+        p50, p99, p999 = np.percentile(rows[name][asked], (50, 99, 99.9))
+        limit = LIMITS[name][PRECISIONS.index(precision)]
+        lines.append(
+            [name, f"{asked.sum()}", *(f"{x:.1e}" for x in (p50, p99, p999, rows[name][worst]))]
+            + [
+                f"{limit:g}",
+                f"{failed(rows, name, precision).sum()}",
+                described(rows, where, worst),
+            ]
+            + [meaning]
+        )
+    head = ["check", "columns", "median", "p99", "p99.9", "worst", "passes to", "failed"]
+    table([*head, "the worst", "error of"], lines)
+
+
+def described(rows, where, i):
+    number, index, row = where[i]
+    streams, layers, _, emitting, *_ = GROUPS[number]
+    kind = " emitting" if emitting else ""
+    stratum = list(STRATA)[rows["stratum"][i]]
+    return f"{stratum}, {streams} streams, {layers}{kind} layers, batch {index} row {row}"
+
+
+def worst(rows, precision, count):
+    """Columns whose errors are largest beside what each check lets pass, most of them cheap."""
+    ratio = np.zeros(rows.size)
+    for name, limits in LIMITS.items():
+        limit = limits[PRECISIONS.index(precision)]
+        if 0 < limit < np.inf and name not in ("budget", "slope", "float32 slope"):
+            ratio = np.maximum(ratio, np.nan_to_num(rows[name]) / limit)
+    return np.argsort(-ratio, kind="stable")[:count]
+
+
+def judged(task):
+    where, value, precision = task
+    number, index, row = where
+    group = GROUPS[number]
+    batch = columns_of(group, index, precision)
+    return stress_truth.error(batch.columns, row, group[0], value)
+
+
+def beside_truth(rows, where, precision, count, most_streams=8, most_layers=16):
+    """The worst columns against 40 digits."""
+    cheap = [k for k, g in enumerate(GROUPS) if g[0] <= most_streams and g[1] <= most_layers]
+    chosen = np.flatnonzero(np.isin(where[:, 0], cheap) & ~rows["beyond"])
+    chosen = chosen[worst(rows[chosen], precision, count)]
+    tasks = [(tuple(where[i].tolist()), float(rows["value"][i]), precision) for i in chosen]
+    started = time.perf_counter()
+    context = get_context("spawn")
+    cores = context.Queue()
+    for core in sorted(os.sched_getaffinity(0)):
+        cores.put(core)
+    with context.Pool(usable_cores(), one_core, (cores,)) as pool:
+        errors = np.array(pool.map(judged, tasks, chunksize=1))
+    known = errors[~np.isnan(errors)]
+    print(
+        f"The {chosen.size} worst columns of up to {most_streams} streams and {most_layers} ",
+        end="",
+    )
+    print(f"layers against 40 digits ({time.perf_counter() - started:.0f} s): ", end="")
+    print(f"median {np.median(known):.1e}, worst {known.max():.1e}", end="")
+    print(f" ({described(rows, where, chosen[np.nanargmax(errors)])}); ", end="")
+    print(f"{np.isnan(errors).sum()} without a truth\n")
+
+
+def refusals(precision):
+    """Numbers out of range, one at a time among ordinary ones: refused by name, or not."""
+    found = {}
+    for group in GROUPS:
+        if group[0] == 2 or group[3]:
+            batch = columns_of(group, 0, precision).columns
+            if group[3]:
+                batch["solar_irradiance"] += 1  # without a sun its place is not asked
+            for name, (offered, named) in refused(batch, group[0]).items():
+                before = found.get(name, (0, 0))
+                found[name] = before[0] + offered, before[1] + named
+    offered, named = np.sum(list(found.values()), axis=0)
+    print(f"Numbers out of range: {named} of {offered} refused by name (", end="")
+    print(", ".join(f"{name} {a[1]}/{a[0]}" for name, a in found.items()) + ")\n")
+    return offered == named
+
+
+def project(took, columns):
+    """How long a run takes once all is compiled, by the fastest batch of each group."""
+    if not all(took.values()):
+        return
+    seconds = [batches(group, LONG) * min(took[group]) for group in GROUPS]
+    hours = sum(seconds) / 3600 / usable_cores()
+    print(f"{LONG} columns would take {hours:.1f} h of {usable_cores()} cores (", end="")
+    each = [f"{g[0]} x {g[1]}: {s / 60:.0f} min" for g, s in zip(GROUPS, seconds, strict=True)]
+    print(", ".join(each) + " of one core)\n")
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--columns", type=int, default=20_000)
+    parser.add_argument("--precision", choices=PRECISIONS, default="float64")
+    parser.add_argument("--judged", type=int, default=24)
+    parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "stress")
+    options = parser.parse_args()
+    folder = options.folder / state_of_code()
+    folder.mkdir(parents=True, exist_ok=True)
+    started = time.perf_counter()
+    jax.config.update("jax_enable_x64", True)
+    use_compilation_cache()
+    print(f"{options.columns} columns, {options.precision}, seed {SEED}, {folder}\n", flush=True)
+    took = run(folder, options.columns, options.precision)
+    rows, where = read(folder, options.columns, options.precision)
+    by_stratum(rows, options.precision)
+    by_check(rows, where, options.precision)
+    if options.judged:
+        beside_truth(rows, where, options.precision, options.judged)
+    named = refusals(options.precision)
+    project(took, options.columns)
+    print(f"{time.perf_counter() - started:.0f} s")
+    wrong = any(failed(rows, name, options.precision).any() for name in CHECKS)
+    sys.exit(1 if wrong or not named else 0)
+
+
+if __name__ == "__main__":
+    main()

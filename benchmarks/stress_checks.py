@@ -1,0 +1,276 @@
+"""What `stress.py` asks of a batch of columns: one error for each column and check.
+
+An error is relative to the reflectance, or to `FLOOR` where that is less; of radiances the floor is
+that share of the strongest source. One that does not apply to a column is NaN, and a result that is
+not finite has an infinite error. `LIMITS` is what passes; `EXPLAINED` says what each error comes
+from.
+"""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from stress_columns import black_body, out_of_range
+
+from abi_operator.solver import toa_albedo, toa_brf, toa_radiance
+
+FLOOR = 1e-3
+AGREE = 0.01  # of N and 2N streams, where signs are judged
+BUDGET = 1e-3
+BUDGET_FLOOR = 0.01  # as `Settings.error_budget` has it
+MOST_STREAMS, DOUBLED_UP_TO = 64, 16
+LOOKED_AT = 64  # columns together, of those that are solved with other streams too
+JIT_UP_TO = 16  # streams: compiling more of them twice takes longer than all the rest
+# Step of the difference quotient, of each argument's own scale; of single precision too, since the
+# quotient is always that of double precision.
+STEP = 1e-5
+# Single precision is right for so much conservative scattering, by which is meant this co-albedo
+# (README, Limits); columns with more are counted, and not judged.
+CONSERVATIVE, MOST_CONSERVATIVE = 1e-6, 1e3
+
+CHECKS = {
+    "finite value": "a value that is not finite",
+    "finite slopes": "a derivative, in any argument, that is not finite",
+    "not negative": "depth below 0 of a reflectance over black ground, N and 2N streams agreeing",
+    "rising in albedo": "fall of it from black to grey or from grey to white ground, likewise",
+    "energy": "plane albedo less 1 of the column made conservative over white ground; radiance of "
+    "the column in an enclosure of one temperature less the black body's",
+    "absorption": "plane albedo outside [0, 1]",
+    "reciprocity": "sun and view exchanged",
+    "jvp and vjp": "forward and reverse mode, of the sum of their terms' sizes",
+    "slope": "forward mode and a difference quotient, of the same",
+    "inside jit": "value inside jax.jit and outside",
+    "slopes inside jit": "slope along one direction inside jax.jit and outside",
+    "budget": f"error budget of {BUDGET:g} and none",
+    "float32": "single and double precision, of the same numbers in single precision",
+    "float32 slope": "slope along one direction, likewise",
+}
+# What passes, in double and in single precision.
+LIMITS = {
+    "finite value": (0.0, 0.0),
+    "finite slopes": (0.0, 0.0),
+    "not negative": (1e-12, 1e-4),
+    "rising in albedo": (1e-10, 1e-3),
+    "energy": (1e-8, 1e-2),
+    "absorption": (1e-10, 1e-3),
+    "reciprocity": (1e-8, 1e-2),
+    "jvp and vjp": (1e-10, 1e-4),
+    "slope": (1e-3, np.inf),
+    "inside jit": (1e-8, 1e-2),
+    "slopes inside jit": (1e-6, 1e-1),
+    "budget": (0.1, 0.1),
+    "float32": (np.inf, 1e-2),
+    "float32 slope": (np.inf, 1e-1),
+}
+
+
+def solved(columns, **how):
+    """Reflectance, or radiance where there are sources."""
+    door = toa_radiance if "planck_levels" in columns else toa_brf
+    return door(**columns, **how)
+
+
+def value(columns, **how):
+    return np.asarray(solved(columns, **how), np.float64)
+
+
+def total(columns, num_streams):
+    found = solved(columns, num_streams=num_streams)
+    return jnp.sum(found), found
+
+
+both = jax.value_and_grad(total, has_aux=True)
+both_inside_jit = jax.jit(both, static_argnums=1)
+
+
+class Judged:
+    """Errors of one batch by check; see `CHECKS`.
+
+    Parameters
+    ----------
+    columns
+        Arguments of the solver, all of one precision.
+    further
+        The moments again, as many as twice the streams need.
+    num_streams
+        How many streams.
+    key
+        Integers that choose the direction along which slopes are compared.
+    """
+
+    def __init__(self, columns, further, num_streams, key):
+        self.columns, self.further, self.streams = columns, further, num_streams
+        self.emitting = "planck_levels" in columns
+        self.single = columns["tau"].dtype == np.float32
+        self.count = columns["mu"].size
+        self.errors = {name: np.full(self.count, np.nan) for name in CHECKS}
+        self.directions = tangents(columns, key)
+        self.floor = np.full(self.count, FLOOR)
+        if self.emitting:
+            sun = columns["solar_irradiance"] * columns["mu0"] / np.pi
+            strongest = [columns["planck_levels"].max(axis=1), columns["surface_emission"]]
+            strongest += [columns["isotropic_top"], sun]
+            self.floor = FLOOR * np.max(strongest, axis=0).astype(np.float64)
+
+    def all(self):
+        self.value = value(self.columns, num_streams=self.streams)
+        self._errors("finite value", np.where(np.isfinite(self.value), 0, np.inf))
+        self._derivatives()
+        self._of_sources() if self.emitting else self._of_sunlight()
+        how = {"num_streams": self.streams}
+        if self.streams < MOST_STREAMS:
+            found = value(self.columns, **how, error_budget=BUDGET)
+            scale = np.maximum(abs(self.value), self.floor * BUDGET_FLOOR / FLOOR)
+            self._errors("budget", abs(found - self.value) / scale)
+        if self.single:
+            double = {name: x.astype(np.float64) for name, x in self.columns.items()}
+            exact = value(double, **how)
+            self._errors("float32", self._apart(self.value, exact))
+            beyond = self.beyond(self.columns["ssa"])
+            for found in self.errors.values():
+                found[beyond] = np.nan
+            if not self.emitting:
+                self.errors["energy"][self.beyond(np.ones_like(self.columns["ssa"]))] = np.nan
+        return self.errors
+
+    def beyond(self, ssa):
+        """Columns with more conservative scattering than single precision is for."""
+        tau = np.where(1 - ssa < CONSERVATIVE, self.columns["tau"], 0).sum(axis=1)
+        return self.single & (tau > MOST_CONSERVATIVE)
+
+    def _errors(self, name, found):
+        self.errors[name] = np.where(np.isnan(found), np.inf, found)
+
+    def _apart(self, found, right):
+        return abs(found - right) / np.maximum(abs(right), self.floor)
+
+    def _derivatives(self):
+        columns, directions = self.columns, self.directions
+        (_, found), slopes = both(columns, self.streams)
+        finite = np.isfinite(np.asarray(found))
+        for slope in slopes.values():
+            finite &= np.isfinite(np.reshape(slope, (self.count, -1))).all(axis=1)
+        self._errors("finite slopes", np.where(finite, 0, np.inf))
+        reverse, sizes = along(slopes, directions)
+        solve = partial(solved, num_streams=self.streams)
+        _, forward = jax.jvp(solve, (columns,), (directions,))
+        scale = np.maximum(sizes, self.floor)
+        self._errors("jvp and vjp", abs(np.asarray(forward, float) - reverse) / scale)
+        double = {name: x.astype(np.float64) for name, x in columns.items()}
+        if not self.single:
+            ahead, behind = (
+                value(moved(double, directions, way * STEP), num_streams=self.streams)
+                for way in (1, -1)
+            )
+            quotient = (ahead - behind) / (2 * STEP)
+            self._errors("slope", abs(quotient - reverse) / np.maximum(scale, abs(self.value)))
+        else:
+            _, exact = both(double, self.streams)
+            wide = {name: x.astype(np.float64) for name, x in directions.items()}
+            exact, sizes = along(exact, wide)
+            self._errors("float32 slope", abs(reverse - exact) / np.maximum(sizes, self.floor))
+        if self.streams <= JIT_UP_TO:
+            (_, inside), slopes = both_inside_jit(columns, self.streams)
+            self._errors("inside jit", self._apart(np.asarray(inside, float), self.value))
+            apart = abs(along(slopes, directions)[0] - reverse)
+            self._errors("slopes inside jit", apart / scale)
+
+    def _of_sunlight(self):
+        columns, how = self.columns, {"num_streams": self.streams}
+        exchanged = columns | {"mu0": columns["mu"], "mu": columns["mu0"]}
+        self._errors("reciprocity", self._apart(value(exchanged, **how), self.value))
+        ground = columns["albedo"]
+        black, white = (value(columns | {"albedo": np.full_like(ground, x)}, **how) for x in (0, 1))
+        size = np.maximum(abs(self.value), self.floor)
+        below = np.maximum(-black, 0) / size
+        fall = np.maximum(np.maximum(black - self.value, self.value - white), 0) / size
+        self._where_streams_agree({"not negative": below, "rising in albedo": fall}, (0, None, 1))
+        lit = {name: columns[name] for name in ("tau", "ssa", "moments", "albedo", "mu0")}
+        share = np.asarray(toa_albedo(**lit, **how), float)
+        self._errors("absorption", np.maximum(np.maximum(-share, share - 1), 0))
+        whole = lit | {"ssa": np.ones_like(lit["ssa"]), "albedo": np.ones_like(ground)}
+        self._errors("energy", abs(np.asarray(toa_albedo(**whole, **how), float) - 1))
+
+    def _where_streams_agree(self, errors, grounds):
+        """Errors, but not of columns in which twice the streams give something else.
+
+        Half of them where twice are slow to compile; over ground of these albedos, None for its
+        own; in double precision. Columns that pass are not looked at.
+        """
+        limits = {name: LIMITS[name][self.single] for name in errors}
+        wrong = np.any([errors[name] > limits[name] for name in errors], axis=0)
+        rows, agree = np.flatnonzero(wrong), np.ones(self.count, bool)
+        more = 2 * self.streams if self.streams <= DOUBLED_UP_TO else self.streams // 2
+        for start in range(0, rows.size, LOOKED_AT):
+            own = rows[start : start + LOOKED_AT]
+            some = np.resize(own, LOOKED_AT)
+            part = {name: x[some].astype(np.float64) for name, x in self.columns.items()}
+            wider = part | {"moments": self.further[some, :, : more + 1].astype(np.float64)}
+            for ground in grounds:
+                over = {} if ground is None else {"albedo": np.full(LOOKED_AT, float(ground))}
+                here = value(part | over, num_streams=self.streams)
+                there = value(wider | over, num_streams=more)
+                agree[own] &= (abs(here - there) <= AGREE * abs(there))[: own.size]
+        for name, found in errors.items():
+            self._errors(name, found)
+            self.errors[name][~agree] = np.nan
+
+    def _of_sources(self):
+        """Nothing can be brighter or darker than black in an enclosure of one temperature."""
+        below = np.maximum(-self.value, 0) / self.floor
+        self._where_streams_agree({"not negative": below}, (None,))
+        columns = self.columns
+        one = np.full_like(columns["albedo"], black_body(300.0))
+        enclosed = columns | {
+            "solar_irradiance": np.zeros_like(one),
+            "planck_levels": np.full_like(columns["planck_levels"], one[0]),
+            "surface_emission": (1 - columns["albedo"]) * one,
+            "isotropic_top": one,
+        }
+        found = value(enclosed, num_streams=self.streams)
+        self._errors("energy", abs(found / one - 1))
+
+
+def tangents(columns, key):
+    """A direction in all arguments: random shares of what each of them can be changed by."""
+    rng = np.random.default_rng([1, *key])
+    found = {}
+    for name, x in columns.items():
+        share = rng.uniform(-1, 1, x.shape)
+        wide = x.astype(np.float64)
+        room = {"ssa": wide * (1 - wide), "albedo": wide * (1 - wide), "relative_azimuth": 1.0}
+        room |= {"mu0": wide * (1 - wide), "mu": wide * (1 - wide)}
+        room |= {"moments": wide * (1 - abs(wide))}
+        found[name] = (share * room.get(name, wide)).astype(x.dtype)
+    return found
+
+
+def moved(columns, directions, step):
+    """Columns a little along a direction, in range."""
+    return {name: x + step * directions[name].astype(x.dtype) for name, x in columns.items()}
+
+
+def along(slopes, directions):
+    """Slope of every column along a direction, and the sum of its terms' sizes."""
+    terms = np.concatenate(
+        [
+            (np.asarray(slopes[name], np.float64) * x).reshape(x.shape[0], -1)
+            for name, x in directions.items()
+        ],
+        axis=1,
+    )
+    return terms.sum(axis=1), abs(terms).sum(axis=1)
+
+
+def refused(columns, num_streams):
+    """Of each argument how often numbers that are not allowed came, and how often it was named."""
+    found = {}
+    for name, _, wrong in out_of_range(columns):
+        offered, named = found.get(name, (0, 0))
+        try:
+            solved(wrong, num_streams=num_streams)
+        except ValueError as error:
+            named += str(error).startswith(name)
+        found[name] = offered + 1, named
+    return found

@@ -1,0 +1,70 @@
+"""The columns and checks of `benchmarks/stress.py`, sampled."""
+
+import jax
+import numpy as np
+import pytest
+import stress
+from stress_checks import LIMITS, Judged, refused
+from stress_columns import STRATA
+
+# Streams, layers at most and at least, whether they emit, columns: few streams, for a program takes
+# longer to compile than its columns to solve.
+SUNLIT = (2, 4, 1, False, 204, 1.0)
+EMITTING = (2, 4, 1, True, 102, 1.0)
+SAMPLED = [(SUNLIT, "float64"), (SUNLIT, "float32"), (EMITTING, "float64")]
+
+
+def wrong(group, index, precision):
+    """Columns of a batch that fail, by check."""
+    batch = stress.columns_of(group, index, precision)
+    errors = Judged(batch.columns, batch.further, group[0], [group[0], index]).all()
+    found = {}
+    for name, error in errors.items():
+        limit = LIMITS[name][stress.PRECISIONS.index(precision)]
+        rows = np.flatnonzero(np.nan_to_num(error) > limit)
+        if rows.size:
+            strata = [list(STRATA)[batch.stratum[i]] for i in rows]
+            found[name] = list(zip(rows.tolist(), strata, error[rows].tolist(), strict=True))
+    return found
+
+
+@pytest.mark.parametrize(("group", "precision"), SAMPLED)
+def test_nothing_fails(group, precision):
+    assert wrong(group, 0, precision) == {}
+
+
+@pytest.mark.parametrize("precision", stress.PRECISIONS)
+def test_numbers_out_of_range_are_refused_by_name(precision):
+    columns = stress.columns_of(EMITTING, 0, precision).columns
+    columns["solar_irradiance"] += 1  # without a sun its place is not asked
+    for name, (offered, named) in refused(columns, EMITTING[0]).items():
+        assert offered > 1 and named == offered, name
+
+
+def test_columns_follow_from_the_name_of_their_batch():
+    """What makes a run that was stopped go on to the same bytes."""
+    first, again = (stress.columns_of(SUNLIT, 3, "float64") for _ in range(2))
+    jax.tree.map(np.testing.assert_array_equal, first, again)
+    other = stress.columns_of(SUNLIT, 4, "float64")
+    assert not np.array_equal(first.columns["tau"], other.columns["tau"])
+
+
+def test_a_batch_that_is_there_is_not_made_again(tmp_path):
+    names = [stress.place(tmp_path, EMITTING, i, "float64") for i in range(2)]
+    stress.judge((tmp_path, EMITTING, range(2), "float64"))
+    whole = [path.read_bytes() for path in names]
+    names[1].unlink()
+    _, seconds = stress.judge((tmp_path, EMITTING, range(2), "float64"))
+    assert len(seconds) == 1
+    assert [path.read_bytes() for path in names] == whole
+    assert sorted(tmp_path.iterdir()) == sorted(names)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", stress.PRECISIONS)
+@pytest.mark.parametrize("group", stress.GROUPS, ids=lambda g: f"{g[0]}x{g[1]}{'e' * g[3]}")
+def test_nothing_fails_among_thousands(group, precision, scale):
+    if scale < 1 and group[0] > 8:
+        pytest.skip("programs of many streams take minutes to compile")
+    for index in range(stress.batches(group, scale * 20_000)):
+        assert wrong(group, index, precision) == {}

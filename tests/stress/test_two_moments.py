@@ -1,0 +1,71 @@
+"""Mass without number, number without mass, traces and floods of both: optics of clouds."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from drawn import REPEATABLE, all_finite, array, powers
+from hypothesis import given
+
+from abi_operator import Atmosphere, Hydrometeor, LiquidCloud
+from abi_operator.bands import BANDS
+from abi_operator.optics import hydrometeor, liquid_cloud
+
+COUNT, BAND, NUM_MOMENTS = 16, "C05", 9
+# Most that a scheme may say, and least; the largest mass weighs as much as all air.
+MASS = {
+    np.float64: array(powers(-300, 4, 5e-324, 1e-12, 1e-3), COUNT),
+    np.float32: array(powers(-36, 4, 1e-45, 1e-12, 1e-3), COUNT),
+}
+NUMBER = {
+    np.float64: array(powers(-300, 300, 5e-324, 1.0, 1e10), COUNT),
+    np.float32: array(powers(-36, 36, 1e-45, 1.0, 1e10), COUNT),
+}
+KINDS = ("mie", "mitchell", "rain", "snow", "graupel")
+
+
+def optics_of(kind, mass, number):
+    """Optical depth, its scattering part and moments of a column of such layers."""
+    levels = np.linspace(0, 1, COUNT + 1).astype(mass.dtype)
+    nothing = LiquidCloud(jnp.zeros_like(mass), jnp.zeros_like(mass))
+    liquid = LiquidCloud(mass, number, kind) if kind in KINDS[:2] else nothing
+    others = {} if kind in KINDS[:2] else {kind: Hydrometeor(mass, number)}
+    air = Atmosphere(1e5 * levels, 2e4 * levels[::-1], liquid, {}, hydrometeors=others)
+    band = BANDS[BAND]
+    found = hydrometeor(air, kind, band) if others else liquid_cloud(air, band)
+    return found.extinction[0], found.scatterers[0].scattering, found.moments(NUM_MOMENTS)
+
+
+def judged(kind, mass, number):
+    """The same, and slopes of the sum of each in mass and number."""
+
+    def total(mass, number):
+        tau, scattering, moments = optics_of(kind, mass, number)
+        return jnp.sum(tau) + jnp.sum(scattering) + jnp.sum(moments)
+
+    return optics_of(kind, mass, number), jax.grad(total, argnums=(0, 1))(mass, number)
+
+
+judge = jax.jit(judged, static_argnums=0)
+
+
+def assert_right(kind, mass, number):
+    (tau, scattering, moments), slopes = judge(kind, mass, number)
+    tau, scattering, moments = (np.asarray(x) for x in (tau, scattering, moments))
+    assert all_finite([tau, scattering, moments, *slopes])
+    assert (tau >= 0).all() and (scattering >= 0).all()
+    assert (scattering <= tau * (1 + 4 * np.finfo(tau.dtype).eps)).all()
+    assert (np.abs(moments) <= 1 + 1e-5).all()
+    assert (tau[(mass == 0) | (number == 0)] == 0).all()
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("kind", KINDS[:3])
+def test_optics_are_finite(kind, dtype):
+    @given(MASS[dtype], NUMBER[dtype])
+    @REPEATABLE
+    def of(mass, number):
+        with np.errstate(under="ignore"):
+            assert_right(kind, mass.astype(dtype), number.astype(dtype))
+
+    of()
