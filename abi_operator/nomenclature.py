@@ -216,8 +216,9 @@ OPTIONAL_RESULT: dict[str, Variable] = {
     "brightness_temperature": Variable(
         HORIZONTAL, "K", "brightness temperature in C07", "toa_brightness_temperature"
     ),
+    "saturated": Variable(("band", "y", "x"), "1", "1 where the imager could tell no more"),
 }
-"""What the result has where C07 is simulated."""
+"""What the result has where C07 is simulated, and where it was observed."""
 
 QUALITY_FLAGS: dict[str, int] = {
     "grazing_sun": 1,  # solar zenith angle above 80 degrees: plane-parallel air is a poor model

@@ -28,7 +28,7 @@ import xarray as xr
 from abi_operator import Fire, State
 from abi_operator.bands import check_bands
 from abi_operator.files import InputError
-from abi_operator.instrument import IMAGER, Imager, reflectance_factor_from_radiance
+from abi_operator.instrument import Imager, reflectance_factor_from_radiance
 from abi_operator.machine.speed import Kept
 from abi_operator.nomenclature import QUALITY_FLAGS, SCENARIO
 from abi_operator.radiance import FIRE_BANDS
@@ -48,7 +48,14 @@ from .images import (
     streams_of,
 )
 from .inverse import DEFAULT_MINIMISER, Minimiser
-from .observation import UNUSABLE, Observation, add_noise, measurement
+from .observation import (
+    UNUSABLE,
+    Observation,
+    add_noise,
+    beyond_the_ceiling,
+    imager_of,
+    measurement,
+)
 from .prior import Prior
 from .product import make_product
 from .results import ResultCode
@@ -120,7 +127,7 @@ def retrieve_fires(
     num_streams = streams_of(dataset) if num_streams is None else num_streams
     with jax.enable_x64(True):
         forward = forward_model(dataset, vector, bands, num_streams)
-        imager = Imager(forward.satellite, noise=IMAGER.noise)
+        imager = imager_of(dataset)
         images = images_of(dataset)
         measured = _measured(images, bands, imager)
         if noise:
@@ -198,8 +205,8 @@ def _measured(images: Sequence[xr.Dataset], bands: tuple[str, ...], imager: Imag
     parts = []
     for image in images:
         distance = _distance(image)
-        seen = image["radiance"].sel(band=list(bands)).transpose("band", "y", "x")
-        values = seen.values.astype(np.float64)
+        seen = beyond_the_ceiling(image["radiance"], image).sel(band=list(bands))
+        values = seen.transpose("band", "y", "x").values.astype(np.float64)
         for i, band in enumerate(bands):
             if band != THERMAL:
                 values[i] = reflectance_factor_from_radiance(

@@ -203,8 +203,12 @@ def streams_of(dataset: xr.Dataset) -> int:
 
 
 def solved_whole(dataset: xr.Dataset) -> bool:
-    """Whether a result has no error of its making, for which a fit could not be exact."""
-    return "error_budget" not in dataset.attrs
+    """Whether a result has no error, of its making or its observation, so that a fit could be
+    exact.
+    """
+    noise = str(dataset.attrs.get("noise", "none"))
+    counted = int(dataset.attrs.get("quantised", 0)) == 1
+    return "error_budget" not in dataset.attrs and noise == "none" and not counted
 
 
 def how_made(

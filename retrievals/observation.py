@@ -32,6 +32,7 @@ _ATTEMPTED = ResultCode.SUCCESS
 # Flags of pixels that are not attempted. Optics beyond what they were fitted to are no reason: the
 # retrieval's operator has the same.
 UNUSABLE = sum(bit for name, bit in QUALITY_FLAGS.items() if name != "outside_fit")
+_ROUNDING = 1e-6  # of single precision, and more
 # How far a saturated band may be exceeded before its likelihood no longer changes, in sigma. [-]
 _ENOUGH = 6.0
 
@@ -227,6 +228,24 @@ def add_noise(reflectance_factor: xr.DataArray, seed: int, imager: Imager = IMAG
     return noisy
 
 
+def imager_of(dataset: xr.Dataset) -> Imager:
+    """The instrument of a result: its satellite, and where C07 saturates if it was observed so."""
+    hottest = dataset.attrs.get("fire_saturation_temperature")
+    return Imager(
+        str(dataset.attrs.get("satellite", IMAGER.satellite)),
+        fire_saturation_temperature=None if hottest is None else float(hottest),
+    )
+
+
+def beyond_the_ceiling(measured: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
+    """Measurements of which those that are saturated, as a result says that was observed, are a
+    little above the ceiling, below which rounding in the file may have taken them.
+    """
+    if "saturated" not in dataset:
+        return measured
+    return measured.where(dataset["saturated"] == 0, measured * (1 + _ROUNDING))
+
+
 def observe(columns: xr.Dataset, bands: tuple[str, ...], imager: Imager = IMAGER) -> Observation:
     """Take the measurement vectors of a Dataset with a dimension ``column``.
 
@@ -240,6 +259,7 @@ def observe(columns: xr.Dataset, bands: tuple[str, ...], imager: Imager = IMAGER
     if "fire_fraction" in columns:
         shines = measured["band"].isin(FIRE_BANDS) & (columns["fire_fraction"] > 0)
         measured = measured.where(~shines)
+    measured = beyond_the_ceiling(measured, columns)
     values = measured.transpose("column", "band").values.astype(np.float64)
     return measurement(values, bands, imager)
 

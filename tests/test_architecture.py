@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = [
     {"__main__"},
     {"cli"},
-    {"simulate_command"},
+    {"observe_command", "simulate_command"},
     {"guard", "sensitivity", "simulation"},
     {"commands", "demo", "drawing", "report", "request"},
     {"scene"},

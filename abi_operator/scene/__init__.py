@@ -33,6 +33,7 @@ from .grounds import check_ocean_wind as check_ocean_wind
 from .hydrometeors import check_microphysics as check_microphysics
 from .land import LandAlbedo as LandAlbedo
 from .land import check_land_albedo as check_land_albedo
+from .observed import observed as observed
 from .run import row_blocks as row_blocks
 from .run import run as run
 from .scenario import check_absorption as check_absorption
