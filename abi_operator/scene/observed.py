@@ -113,7 +113,8 @@ def _reported(
     brf = found["reflectance_factor"] / np.where(sun > 0, sun, np.nan)
 
     def variable(name: str, x: np.ndarray) -> xr.DataArray:
-        return radiance.copy(data=x.reshape(radiance.shape)).assign_attrs(cf_attributes(name))
+        values = x.reshape(radiance.shape)
+        return xr.DataArray(values, radiance.coords, radiance.dims, attrs=cf_attributes(name))
 
     fields = {
         "radiance": variable("radiance", found["radiance"]),

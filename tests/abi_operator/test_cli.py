@@ -279,6 +279,18 @@ def test_gases_ice_fires_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
         assert result.attrs["fires_file"] == inputs.fires.name
         assert np.isfinite(result["radiance"]).all()
     assert complaints(out / "result.nc") == []
+    seen = tmp_path / "seen.nc"
+    how = ["--seed", 1, "--fire-saturation-temperature", 300, "--quantised", "--out", seen]
+    outcome = invoke("observe", out / "result.nc", *how)
+    assert outcome.exit_code == 0, outcome.output
+    assert "saturated pixels: C04 0, C07 " in outcome.output
+    assert complaints(seen) == []
+    with read_result(seen) as report:
+        assert report["brightness_temperature"].max() < 300.01
+        assert report.attrs["noise"] == "of the instrument, seed 1"
+        assert "temperature" in report  # all that a retrieval needs goes along
+    outcome = invoke("observe", seen, "--out", tmp_path / "again.nc")
+    assert outcome.exit_code == 2 and "was observed before" in outcome.stderr
 
 
 def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
