@@ -10,12 +10,19 @@ simulation (``abi-operator sensitivity``).
 C03 is changed until the plume is 10 % brighter there, and darker (`ssa_for_mean`, `ssa_of_each`),
 and green is derived from both, by the recipes of `products` and by a `green_table` (``abi-operator
 nir-test``).
+
+`green_figure`, `albedo_figure` and `fires_figure` draw other arguments of that paper on a scene
+(``abi-operator figure``).
 """
 
 from .declarations import aod_550 as aod_550
 from .declarations import declared as declared
 from .derivatives import Sensitivity as Sensitivity
 from .derivatives import sensitivity as sensitivity
+from .figure_albedo import albedo_figure as albedo_figure
+from .figure_fires import fires_by_hour as fires_by_hour
+from .figure_fires import fires_figure as fires_figure
+from .figure_green import green_figure as green_figure
 from .green_table import GreenTable as GreenTable
 from .green_table import green_table as green_table
 from .inputs import Input as Input

@@ -1,4 +1,4 @@
-"""The commands ``abi-operator nir-test`` and ``abi-operator sensitivity``."""
+"""The commands ``abi-operator nir-test``, ``sensitivity`` and ``figure``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +11,11 @@ from ..commands import one_sentence, typed
 from ..files import InputError, output_folder, read_result
 from . import nir_report, sensitivity_report
 from .declarations import BY_BAND, SHORT_NAMES
+from .figure_albedo import albedo_figure
+from .figure_fires import fires_figure
+from .figure_green import green_figure
 from .nir_study import nir_study
+from .panels import write_panels
 from .scene_study import Sampling, sensitivity_study
 
 _RESULT = typer.Argument(help="result.nc of a simulation, all of it.")
@@ -19,7 +23,8 @@ _TIME = typer.Option(min=0, help="Which of the result's times, counted from 0.")
 _SAMPLED = typer.Option(min=1, help="Pixels that are checked.")
 _SEED = typer.Option(min=0, help="Seed of the draws.")
 _FIRE = typer.Option(
-    metavar="SHARE,KELVIN", help="What burns in every pixel, for fire_contrast alone."
+    metavar="SHARE,KELVIN",
+    help="What burns in every pixel where fires are asked for.",
 )
 _OUT = typer.Option(help="Folder for what is found; made if need be.")
 
@@ -154,6 +159,50 @@ def sensitivity(
             table = sensitivity_report.csv_of(sensitivity_report.ranking(study))
             (folder / "sensitivity.csv").write_text(table)
     _say("sensitivity", out, sensitivity_report.report_lines(study))
+
+
+def figure(
+    context: typer.Context,
+    name: Annotated[str, typer.Argument(help="One of green, albedo and fires.")],
+    result: Annotated[Path, _RESULT],
+    out: Annotated[Path, _OUT],
+    fire: Annotated[str, _FIRE] = "0.04,800",
+    time: Annotated[int, _TIME] = 0,
+) -> None:
+    """Draw one of the paper's arguments on a scene.
+
+    green: derived green beside simulated light of 0.555 um. albedo: how fires and a plume stand
+    out from land with MODIS and with constant albedo. fires: which fires show in C06, by the
+    ground, the time of day and their temperature. Writes NAME.png and, of maps, NAME.nc, and
+    prints figures.
+
+    \b
+    abi-operator figure green ash/result.nc --out ash/figures
+    """
+    if name not in _FIGURES:
+        raise typer.BadParameter(f"no figure {name!r}; choose from {', '.join(_FIGURES)}.")
+    with one_sentence():
+        image = read_image(result, time)
+        drawn = _FIGURES[name](image, _fire(fire))
+        with output_folder(out) as folder:
+            write_panels(folder / f"{name}.png", drawn.panels, drawn.columns, drawn.caption)
+            if drawn.fields:
+                fields = {x: (("y", "x"), y, {"units": "1"}) for x, y in drawn.fields.items()}
+                maps = xr.Dataset(fields, {x: image[x] for x in ("latitude", "longitude")})
+                maps.attrs |= {"title": drawn.caption, "history": history(context, image)}
+                write_dataset(maps, folder / f"{name}.nc")
+    typer.echo(f"wrote {out / name}.png")
+    if drawn.fields:
+        typer.echo(f"wrote {out / name}.nc")
+    for line in drawn.lines:
+        typer.echo(line)
+
+
+_FIGURES = {
+    "green": lambda image, _fire: green_figure(image),
+    "albedo": albedo_figure,
+    "fires": fires_figure,
+}
 
 
 def _say(name: str, out: Path, lines: list[str]) -> None:

@@ -111,9 +111,9 @@ def sensitivity_study(
             raise ValueError(f"sigma of {', '.join(unknown)} is given, which nothing hangs on.")
         with jax.enable_x64(True):
             covariance = covariance_of(inputs, correlations)
-            chosen = _chosen(image, species, where)
-            states = _states(image, chosen, of, fire)
-            function = output_function(of, _settings(image), _sun_distance(image))
+            chosen = chosen_pixels(image, species, where)
+            states = states_of(image, chosen, of, fire)
+            function = output_function(of, settings_of_result(image), sun_distance_of(image))
             found = sensitivity(function, states, inputs, second_order=second_order)
             sampled = _sampled(function, states, inputs, found, covariance, sampling or Sampling())
     except ValueError as error:
@@ -176,7 +176,7 @@ def _check(image: xr.Dataset, of: Sequence[str], species: str | None) -> None:
         raise ValueError(f"the result has no band {', '.join(lacking)}; simulate it.")
 
 
-def _chosen(image: xr.Dataset, species: str | None, where: str) -> np.ndarray:
+def chosen_pixels(image: xr.Dataset, species: str | None, where: str) -> np.ndarray:
     """Pixels that are looked at (y, x)."""
     if where not in ("plume", "all"):
         raise ValueError(f"pixels are those of 'plume' or 'all'; got {where!r}.")
@@ -188,7 +188,8 @@ def _chosen(image: xr.Dataset, species: str | None, where: str) -> np.ndarray:
     return chosen
 
 
-def _states(image: xr.Dataset, chosen: np.ndarray, of: Sequence[str], fire: Fire) -> State:
+def states_of(image: xr.Dataset, chosen: np.ndarray, of: Sequence[str], fire: Fire) -> State:
+    """Columns of pixels (y, x), with a fire and temperatures where its contrast is looked at."""
     y, x = (xr.DataArray(index, dims="column") for index in np.nonzero(chosen))
     states = column_states(image.isel(y=y, x=x), bands_of(of))
     if FIRE_CONTRAST not in of:
@@ -204,7 +205,8 @@ def _states(image: xr.Dataset, chosen: np.ndarray, of: Sequence[str], fire: Fire
     return replace(states, atmosphere=air, surface_temperature=ground, fire=burning)
 
 
-def _settings(image: xr.Dataset) -> Settings:
+def settings_of_result(image: xr.Dataset) -> Settings:
+    """How a result was simulated, but for the error that it was allowed."""
     return Settings(
         satellite=str(image.attrs.get("satellite", "GOES-16")),
         gases=gases_of(image),
@@ -212,7 +214,8 @@ def _settings(image: xr.Dataset) -> Settings:
     )
 
 
-def _sun_distance(image: xr.Dataset) -> float:
+def sun_distance_of(image: xr.Dataset) -> float:
+    """Distance of the sun at the time of a result, 1 where it has none. [AU]"""
     return sun_distance(image["time"].values) if "time" in image.variables else 1.0
 
 
