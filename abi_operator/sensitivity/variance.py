@@ -141,6 +141,7 @@ def sampled_variance(
     root = vectors * np.sqrt(np.maximum(values, 0))
     rng = np.random.default_rng(seed)
     draws = rng.standard_normal((num_samples, columns, len(inputs))) @ root.T
+    draws = draws.astype(jacobian.dtype)
     together = max(1, _COLUMNS // columns)
     found, use = [], []
     for first in range(0, num_samples, together):
