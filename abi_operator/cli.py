@@ -30,7 +30,7 @@ from .guard.commands import jacobian
 from .machine import kept
 from .machine.speed import default_cache_folder, use_compilation_cache, use_compiler_flags
 from .observe_command import observe
-from .sensitivity.commands import nir_test
+from .sensitivity.commands import figure, nir_test, sensitivity
 from .simulate_command import print_report, simulate
 from .simulation import Request, Species, open_scene, pictures_of_before, simulate_scene
 
@@ -133,6 +133,8 @@ def make_app(prepare: Callable[[bool], None] = lambda keep_programs: None) -> ty
     app.command()(demo)
     app.command()(observe)
     app.command()(nir_test)
+    app.command()(sensitivity)
+    app.command()(figure)
     app.add_typer(jacobian, name="jacobian")
     for entry in sorted(entry_points(group=COMMANDS), key=lambda entry: entry.name):
         command = None if entry.name == "demo" else _load(entry)

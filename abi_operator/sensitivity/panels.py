@@ -103,6 +103,64 @@ def histogram(
     return Panel(title, np.asarray(picture) / 255, is_map=False)
 
 
+def scatter(title: str, x: np.ndarray, y: np.ndarray, high: float, axes: str) -> Panel:
+    """How many pixels have which pair of values, the darker the more, and the line of equals.
+
+    Parameters
+    ----------
+    title, axes
+        What it is of, and what the axes are.
+    x, y
+        Pairs; both axes run from 0 to `high`, those beyond are not shown.
+    """
+    count = np.histogram2d(y, x, 96, ((0, high), (0, high)))[0]
+    shade = np.log1p(count) / max(float(np.log1p(count.max())), 1e-9)
+    field = np.kron(1 - shade[::-1], np.ones((_WIDTH // 96, _WIDTH // 96)))
+    levels = np.repeat(np.rint(255 * field)[..., None], 3, axis=-1).astype(np.uint8)
+    picture = Image.fromarray(levels)
+    draw = ImageDraw.Draw(picture)
+    draw.line([(0, _WIDTH - 1), (_WIDTH - 1, 0)], fill=_LINES[0], width=1)
+    draw.rectangle([0, 0, _WIDTH - 1, _WIDTH - 1], outline="black")
+    draw.text((8, 4), f"{axes}, 0 to {high:.2g}", fill="black", font=_font())
+    return Panel(title, np.asarray(picture) / 255, is_map=False)
+
+
+def curves(
+    title: str, x: np.ndarray, series: dict[str, np.ndarray], low: float, high: float, axes: str
+) -> Panel:
+    """Lines over one another, NaN left out.
+
+    Parameters
+    ----------
+    title, axes
+        What it is of, and what the axes are.
+    x
+        Rising values of the first axis, which runs between them.
+    series
+        Values by name, each as long as x.
+    low, high
+        Ends of the second axis; beyond them lines run along the edge.
+    """
+    picture = Image.new("RGB", (_WIDTH, _WIDTH), "white")
+    draw, bottom, top = ImageDraw.Draw(picture), _WIDTH - 30, 44
+    across = (x - x[0]) / (x[-1] - x[0]) * (_WIDTH - 1)
+    for k, (name, values) in enumerate(series.items()):
+        share = np.clip((values - low) / (high - low), 0, 1)
+        colour = _curve_colour(k, len(series))
+        good = np.isfinite(values)
+        points = [
+            (float(a), float(bottom - s * (bottom - top)))
+            for a, s in zip(across[good], share[good], strict=True)
+        ]
+        if len(points) > 1:
+            draw.line(points, fill=colour, width=2)
+        draw.text((8 + 74 * k, 4), name, fill=colour, font=_font())
+    draw.rectangle([0, top, _WIDTH - 1, bottom], outline="black")
+    draw.text((8, 24), f"{axes}, {low:.3g} to {high:.3g}", fill="black", font=_font())
+    _ends(draw, bottom + 6, Bar(float(x[0]), float(x[-1]), ""), sign="")
+    return Panel(title, np.asarray(picture) / 255, is_map=False)
+
+
 def write_panels(
     path: str | PathLike[str], panels: Sequence[Panel], columns: int, caption: str = ""
 ) -> None:
@@ -152,8 +210,16 @@ def _drawn(panel: Panel) -> Image.Image:
     return sheet
 
 
-def _ends(draw: ImageDraw.ImageDraw, y: float, bar: Bar) -> None:
-    texts = f"{bar.low:+.3g}", f"{(bar.low + bar.high) / 2:.3g}", f"{bar.high:+.3g} {bar.unit}"
+def _curve_colour(k: int, count: int) -> tuple[int, int, int]:
+    """From blue, the first, to red."""
+    shade = _diverging(np.array([[-0.8 + 1.6 * k / max(count - 1, 1)]]))[0, 0]
+    red, green, blue = (int(x) for x in np.rint(200 * shade))
+    return red, green, blue
+
+
+def _ends(draw: ImageDraw.ImageDraw, y: float, bar: Bar, sign: str = "+") -> None:
+    middle = (bar.low + bar.high) / 2
+    texts = f"{bar.low:{sign}.4g}", f"{middle:.4g}", f"{bar.high:{sign}.4g} {bar.unit}"
     for text, x, anchor in zip(texts, (0, _WIDTH / 2, _WIDTH), ("la", "ma", "ra"), strict=True):
         draw.text((x, y), text, fill="black", font=_font(), anchor=anchor)
 

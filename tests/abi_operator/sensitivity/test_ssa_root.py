@@ -17,7 +17,7 @@ AGREE = 1e-8
 
 @pytest.fixture(scope="module")
 def plume(image):
-    inside = (image["ash_brightness"] > 0.1).values
+    inside = (image["ash_brightness"] > 0).values
     states = jax.tree.map(lambda x: x[inside.ravel()], column_states(image, ("C03",)))
     return PlumeBand(states, "ash", "C03", HOW)
 

@@ -1,0 +1,302 @@
+"""Sensitivities on a scene: the result of a simulation in, maps out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
+
+import jax
+import numpy as np
+import xarray as xr
+
+from ..atmosphere import Fire, State
+from ..files import InputError
+from ..files.result import CONVENTIONS
+from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
+from ..scene import column_states, gases_of, species_of
+from ..scene.angles import sun_distance
+from ..settings import Settings
+from .declarations import declared
+from .derivatives import Function, Sensitivity, sensitivity
+from .inputs import Input
+from .outputs import FIRE_CONTRAST, bands_of, check_outputs, output_function
+from .variance import SampledVariance, covariance_of, sampled_variance, variance_parts
+
+STANDARD_TEMPERATURE = 288.15
+"""Of ground and air where a result has none and a fire is added: what they give off themselves is
+some 1e-4 of sunlight in C06. [K]"""
+DEFAULT_FIRE = Fire(0.04, 800.0)  # pyright: ignore[reportArgumentType]
+"""One cell of 400 m in a pixel of 2 km."""
+
+_DARK = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
+
+
+class Sampling(NamedTuple):
+    """How the variance is checked by draws.
+
+    Parameters
+    ----------
+    num_samples
+        Draws a pixel; 0 for no check.
+    num_pixels
+        Pixels that are checked, chosen by the seed.
+    seed
+        Of the draws.
+    """
+
+    num_samples: int = 256
+    num_pixels: int = 64
+    seed: int = 0
+
+
+def sensitivity_study(
+    image: xr.Dataset,
+    of: Sequence[str],
+    to: Sequence[str | Input],
+    *,
+    species: str | None = None,
+    where: Literal["plume", "all"] = "plume",
+    sigma: Mapping[str, float] | None = None,
+    correlations: Mapping[tuple[str, str], float] | None = None,
+    fire: Fire = DEFAULT_FIRE,
+    second_order: bool = True,
+    sampling: Sampling | None = None,
+) -> xr.Dataset:
+    """Sensitivities of a scene's image to what is in the scene, in float64.
+
+    Parameters
+    ----------
+    image
+        Result of a simulation at one time, all of it.
+    of
+        What is looked at, as `outputs.check_outputs` takes it.
+    to
+        What is changed: names as `declarations.declared` takes them, or inputs of your own.
+    species
+        Name of the plume; None for the one that the scene has, if it has one.
+    where
+        ``"plume"``: pixels in the plume, all of a scene without; ``"all"``: all that the sun
+        shines on.
+    sigma
+        Steps and standard deviations by name, in place of the declared ones.
+    correlations
+        Between inputs, by pairs of names. [-]
+    fire
+        What burns in every pixel where the contrast of a fire is looked at.
+    second_order, sampling
+        Whether second derivatives are wanted, and the check of the variance (None: as it is by
+        default).
+
+    Returns
+    -------
+    xarray.Dataset
+        Along ``of``, ``to``, y and x: ``jacobian``, ``elasticity``, ``change_up``,
+        ``change_down``, ``second_derivative``, ``variance_part``, ``sampled_part`` and its
+        standard error ``sampled_part_error``; along ``of``, y and x ``value``, ``variance``,
+        ``sampled_variance``, ``sampled_variance_error`` and ``sampled_linear``; ``step`` along
+        ``to``. NaN where a
+        pixel is not looked at, or may not be changed so.
+
+    Raises
+    ------
+    InputError
+        Where the result lacks something, or a name is unknown.
+    """
+    try:
+        of = check_outputs(of)
+        species = _species(image, species)
+        _check(image, of, species)
+        inputs = [_input(one, species, sigma or {}) for one in to]
+        unknown = sorted(set(sigma or {}) - {one.name for one in inputs})
+        if unknown:
+            raise ValueError(f"sigma of {', '.join(unknown)} is given, which nothing hangs on.")
+        with jax.enable_x64(True):
+            covariance = covariance_of(inputs, correlations)
+            chosen = chosen_pixels(image, species, where)
+            states = states_of(image, chosen, of, fire)
+            function = output_function(of, settings_of_result(image), sun_distance_of(image))
+            found = sensitivity(function, states, inputs, second_order=second_order)
+            sampled = _sampled(function, states, inputs, found, covariance, sampling or Sampling())
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    return _dataset(image, chosen, (of, inputs), found, covariance, sampled)
+
+
+class _Sampled(NamedTuple):
+    pixels: np.ndarray
+    variance: SampledVariance
+
+
+def _sampled(
+    function: Function,
+    states: State,
+    inputs: Sequence[Input],
+    found: Sensitivity,
+    covariance: np.ndarray,
+    sampling: Sampling,
+) -> _Sampled | None:
+    if not sampling.num_samples:
+        return None
+    rng = np.random.default_rng(sampling.seed)
+    count = len(found.value)
+    pixels = np.sort(rng.choice(count, min(sampling.num_pixels, count), replace=False))
+    some = jax.tree.map(lambda x: x[pixels], states)
+    how = {"num_samples": sampling.num_samples, "seed": sampling.seed}
+    jacobian = found.jacobian[pixels]
+    return _Sampled(pixels, sampled_variance(function, some, inputs, jacobian, covariance, **how))
+
+
+def _input(one: str | Input, species: str | None, sigma: Mapping[str, float]) -> Input:
+    found = declared(one, species) if isinstance(one, str) else one
+    return found.stepping(sigma[found.name]) if found.name in sigma else found
+
+
+def _species(image: xr.Dataset, species: str | None) -> str | None:
+    there = species_of(image)
+    if species is not None and species not in there:
+        raise ValueError(
+            f"the result has no plume of {species} (plumes: {', '.join(there) or 'none'})."
+        )
+    if species is None and len(there) > 1:
+        raise ValueError(f"the result has plumes of {', '.join(there)}; say which is meant.")
+    return species if species is not None else next(iter(there), None)
+
+
+def _check(image: xr.Dataset, of: Sequence[str], species: str | None) -> None:
+    if "time" in image.dims:
+        raise ValueError(f"one time at a time is looked at; the result has {image.sizes['time']}.")
+    plume = [] if species is None else [f"{species}_{name}" for name in PLUME]
+    missing = [name for name in (*SCENARIO, *plume) if name not in image.variables]
+    if missing:
+        raise ValueError(
+            f"the result has no {', '.join(missing)}; keep all of it (abi-operator simulate "
+            "without --variables)."
+        )
+    lacking = sorted(set(bands_of(of)) - set(image["band"].values.tolist()))
+    if lacking:
+        raise ValueError(f"the result has no band {', '.join(lacking)}; simulate it.")
+
+
+def chosen_pixels(image: xr.Dataset, species: str | None, where: str) -> np.ndarray:
+    """Pixels that are looked at (y, x)."""
+    if where not in ("plume", "all"):
+        raise ValueError(f"pixels are those of 'plume' or 'all'; got {where!r}.")
+    chosen = (image["quality_flag"].values & _DARK) == 0
+    if where == "plume" and species is not None:
+        chosen &= image[f"{species}_brightness"].values > 0
+    if not chosen.any():
+        raise ValueError("there is no pixel to look at: the sun shines on none of those chosen.")
+    return chosen
+
+
+def states_of(image: xr.Dataset, chosen: np.ndarray, of: Sequence[str], fire: Fire) -> State:
+    """Columns of pixels (y, x), with a fire and temperatures where its contrast is looked at."""
+    y, x = (xr.DataArray(index, dims="column") for index in np.nonzero(chosen))
+    states = column_states(image.isel(y=y, x=x), bands_of(of))
+    if FIRE_CONTRAST not in of:
+        return states
+    count = int(chosen.sum())
+    burning = jax.tree.map(lambda value: np.full(count, float(value)), fire)
+    air, ground = states.atmosphere, states.surface_temperature
+    if air.temperature is None:
+        warm: Any = np.full_like(air.pressure, STANDARD_TEMPERATURE)
+        air = replace(air, temperature=warm)
+    if ground is None:
+        ground = np.asarray(air.temperature)[:, -1]
+    return replace(states, atmosphere=air, surface_temperature=ground, fire=burning)
+
+
+def settings_of_result(image: xr.Dataset) -> Settings:
+    """How a result was simulated, but for the error that it was allowed."""
+    return Settings(
+        satellite=str(image.attrs.get("satellite", "GOES-16")),
+        gases=gases_of(image),
+        num_streams=int(image.attrs.get("num_streams", 8)),
+    )
+
+
+def sun_distance_of(image: xr.Dataset) -> float:
+    """Distance of the sun at the time of a result, 1 where it has none. [AU]"""
+    return sun_distance(image["time"].values) if "time" in image.variables else 1.0
+
+
+def _dataset(
+    image: xr.Dataset,
+    chosen: np.ndarray,
+    names: tuple[Sequence[str], Sequence[Input]],
+    found: Sensitivity,
+    covariance: np.ndarray,
+    sampled: _Sampled | None,
+) -> xr.Dataset:
+    of, inputs = names
+    rows, entries = ("of", "y", "x"), ("of", "to", "y", "x")
+    parts = variance_parts(found.jacobian, covariance)
+    fields = {
+        "value": (rows, found.value, "what is looked at"),
+        "input": (("to", "y", "x"), found.inputs, "what is changed, as it is"),
+        "jacobian": (entries, found.jacobian, "derivative"),
+        "elasticity": (entries, found.elasticity, "relative change for a relative change"),
+        "change_up": (entries, found.up, "change for one step up"),
+        "change_down": (entries, found.down, "change for one step down"),
+        "second_derivative": (entries, _diagonal(found.second), "second derivative"),
+        "variance": (rows, parts.sum(axis=-1), "variance to first order"),
+        "variance_part": (entries, parts, "part of the variance due to an input, to first order"),
+    }
+    if sampled is not None:
+        chosen_again = sampled.pixels, len(found.value)
+        by = sampled.variance
+        more = {
+            "sampled_variance": (rows, by.total, "variance by sampling"),
+            "sampled_variance_error": (rows, by.total_error, "its standard error"),
+            "sampled_linear": (rows, by.linear, "variance to first order of the same draws"),
+            "sampled_part": (entries, by.parts, "part of the variance by sampling"),
+            "sampled_part_error": (entries, by.parts_error, "its standard error"),
+            "sample_count": (("y", "x"), by.draws, "draws that count"),
+        }
+        fields |= {
+            name: (dims, _spread(values, *chosen_again), words)
+            for name, (dims, values, words) in more.items()
+        }
+    variables = {
+        name: (dims, _on_map(values, chosen), {"long_name": words})
+        for name, (dims, values, words) in fields.items()
+    }
+    variables["step"] = (
+        ("to",),
+        np.array([one.step for one in inputs]),
+        {"long_name": "finite step and standard deviation, in the unit of the input"},
+    )
+    variables["covariance"] = (("to", "with"), covariance, {"long_name": "of the inputs"})
+    short = [one.name for one in inputs]
+    coordinates = {
+        "of": ("of", list(of), {"long_name": "what is looked at"}),
+        "to": ("to", short, {"long_name": "what is changed"}),
+        "with": ("with", short, {"long_name": "what is changed"}),
+        "to_units": ("to", [one.units for one in inputs], {"long_name": "unit of the input"}),
+        "to_name": ("to", [one.long_name for one in inputs], {"long_name": "the input in words"}),
+    }
+    result = xr.Dataset(variables, coordinates)
+    kept = ("latitude", "longitude", "time", "crs", "y", "x")
+    result = result.assign_coords({name: image[name] for name in kept if name in image.variables})
+    if "time" in result.coords:
+        result["time"].attrs["units_metadata"] = "leap_seconds: none"
+    return result.assign_attrs(
+        {"Conventions": CONVENTIONS, "title": "Sensitivities of a scene's synthetic imagery"}
+    )
+
+
+def _on_map(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Of columns first to a map behind the other axes, NaN elsewhere."""
+    field = np.full((*values.shape[1:], *chosen.shape), np.nan)
+    field[..., chosen] = np.moveaxis(values, 0, -1)
+    return field
+
+
+def _spread(values: np.ndarray, pixels: np.ndarray, count: int) -> np.ndarray:
+    """Of some columns to all of them, NaN for others."""
+    full = np.full((count, *values.shape[1:]), np.nan)
+    full[pixels] = values
+    return full
+
+
+def _diagonal(second: np.ndarray) -> np.ndarray:
+    return np.diagonal(second, axis1=-2, axis2=-1)

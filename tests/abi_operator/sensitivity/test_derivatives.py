@@ -1,0 +1,135 @@
+"""Sensitivities of a function of the operator's output against differences, at random inputs."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from columns_of_smoke import BANDS, HOW, INPUTS, burning, colour, columns
+
+from abi_operator import brf
+from abi_operator.products import derived_green
+from abi_operator.sensitivity import declared, output_function, sensitivity
+from abi_operator.sensitivity.inputs import changed
+from abi_operator.settings import Settings
+
+# Central differences over a thousandth of a step err by its square, relative, and by rounding.
+STEP, AGREE = 1e-3, 1e-6
+# Of second derivatives, in steps: they too err by its square, relative.
+FINE = 0.01
+
+
+@pytest.fixture(scope="module")
+def states():
+    return columns()
+
+
+@pytest.fixture(scope="module")
+def found(states):
+    return sensitivity(colour, states, INPUTS)
+
+
+def value_at(states, k, change, function=colour):
+    by = np.zeros((states.geometry.solar_zenith.shape[0], len(INPUTS)))
+    by[:, k] = change
+    return np.asarray(function(changed(states, INPUTS, jnp.asarray(by))))
+
+
+def assert_close(ours, theirs, agree):
+    """Relative to the largest of each column and number."""
+    assert np.isfinite(ours).all()
+    largest = np.abs(theirs).max(axis=-1, keepdims=True)
+    assert np.max(np.abs(ours - theirs) / largest) < agree
+
+
+def test_jacobians_are_central_differences(states, found):
+    np.testing.assert_allclose(found.value, colour(states), rtol=1e-12)
+    steps = [STEP * one.step for one in INPUTS]
+    differences = [
+        (value_at(states, k, h) - value_at(states, k, -h)) / (2 * h) for k, h in enumerate(steps)
+    ]
+    scale = np.array([one.step for one in INPUTS])
+    assert_close(found.jacobian * scale, np.stack(differences, axis=-1) * scale, AGREE)
+
+
+def test_elasticities_are_relative(states, found):
+    """Those of a factor, 1, and of an optical depth: the slope of the logarithms."""
+    for k in (0, 5):
+        own = found.inputs[:, k]
+        h = STEP * own
+        ahead, behind = (value_at(states, k, s * h) for s in (1, -1))
+        expected = np.log(np.abs(ahead / behind)) / np.log((1 + STEP) / (1 - STEP))
+        np.testing.assert_allclose(found.elasticity[..., k], expected, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(found.inputs[:, 0], states.atmosphere.plumes["smoke"].aod_550)
+    assert (found.inputs[:, 5] == 1).all()
+
+
+def test_finite_changes_are_those_of_the_operator(states, found):
+    for k, one in enumerate(INPUTS):
+        for ours, sign in ((found.up, 1), (found.down, -1)):
+            theirs = value_at(states, k, sign * one.step) - found.value
+            np.testing.assert_allclose(ours[..., k], theirs, atol=1e-13)
+
+
+def test_second_derivatives_are_symmetric_and_those_of_values(states, found):
+    scale = np.array([one.step for one in INPUTS])
+    second = found.second * scale[:, None] * scale
+    largest = np.abs(second).max(axis=(-1, -2), keepdims=True)
+    # Heights of plumes have none where an edge is on a level; these lie between levels.
+    assert np.max(np.abs(second - np.swapaxes(second, -1, -2)) / largest) < 1e-4
+    for k, one in enumerate(INPUTS):
+        h = FINE * one.step
+        sides = value_at(states, k, h) + value_at(states, k, -h) - 2 * found.value
+        expected = sides / FINE**2
+        assert np.max(np.abs(second[..., k, k] - expected) / largest[..., 0, 0]) < 1e-4
+
+
+def test_what_may_not_be_is_no_number(states):
+    """A single-scattering albedo above 1, an optical depth below 0; what may be is told."""
+    inputs = INPUTS[0].stepping(5.0), INPUTS[1].stepping(0.2), *INPUTS[2:]
+    some = sensitivity(colour, states, inputs, second_order=False)
+    assert np.isfinite(some.up[..., 0]).all() and np.isnan(some.down[..., 0]).all()
+    assert np.isnan(some.up[..., 1]).all() and np.isfinite(some.down[..., 1]).all()
+    assert np.isnan(some.second).all()
+
+
+def test_outputs_by_name(states):
+    names = ("C06", "C02", "green", "green:bah2018")
+    some = output_function(names, Settings(**HOW))(states)
+    blue, red, near, infrared = np.asarray(brf(states, BANDS, **HOW)).T
+    np.testing.assert_allclose(some[:, 0], infrared, rtol=1e-12)
+    np.testing.assert_allclose(some[:, 1], red, rtol=1e-12)
+    np.testing.assert_allclose(some[:, 2], derived_green(red, blue, near), rtol=1e-12)
+    other = derived_green(red, blue, near, recipe="bah2018")
+    np.testing.assert_allclose(some[:, 3], other, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_fires_contrast_and_its_slopes(states):
+    """A fire shows in proportion to its size; what it gives off is added to what is reflected."""
+    fires = burning(states)
+    inputs = [declared("fire_fraction"), declared("fire_temperature"), declared("albedo_C06")]
+    contrast = output_function(["fire_contrast"], Settings(**HOW))
+    found = sensitivity(contrast, fires, inputs, second_order=False)
+    np.testing.assert_allclose(found.elasticity[:, 0, 0], 1, atol=1e-3)
+    for k, one in enumerate(inputs):
+        h = STEP * one.step
+        by = jnp.zeros((6, 3)).at[:, k].set(h)
+        ahead, behind = (contrast(changed(fires, inputs, x)) for x in (by, -by))
+        np.testing.assert_allclose(found.jacobian[..., k], (ahead - behind) / (2 * h), rtol=1e-5)
+    value = found.value[:, 0]
+    smaller, hotter = burning(states, fraction=0.01), burning(states, temperature=900.0)
+    np.testing.assert_allclose(contrast(smaller)[:, 0], value / 2, rtol=1e-3)
+    assert (contrast(hotter)[:, 0] > 2 * value).all()
+    assert (found.jacobian[:, 0, :2] > 0).all() and (found.jacobian[:, 0, 2] < 0).all()
+
+
+def test_what_cannot_be_asked_is_told(states):
+    with pytest.raises(ValueError, match="no input to be sensitive to"):
+        sensitivity(colour, states, ())
+    with pytest.raises(ValueError, match=r"gives \(6,\) or \(6, n\) numbers; got \(\)"):
+        sensitivity(lambda s: colour(s).sum(), states, INPUTS)
+    with pytest.raises(ValueError, match="no output 'C09'; choose from C01"):
+        output_function(["C09"], Settings(**HOW))
+    with pytest.raises(ValueError, match="no output to look at"):
+        output_function([], Settings(**HOW))
+    with pytest.raises(ValueError, match="of states with a fire"):
+        output_function(["fire_contrast"], Settings(**HOW))(states)

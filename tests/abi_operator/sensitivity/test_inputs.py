@@ -1,0 +1,70 @@
+"""What can be changed, by declaration."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from columns_of_smoke import burning, columns
+
+from abi_operator.sensitivity import declared, factor, leaf
+from abi_operator.sensitivity.declarations import BY_BAND, SHORT_NAMES
+from abi_operator.sensitivity.inputs import changed, part
+
+
+@pytest.fixture(scope="module")
+def states():
+    return burning(columns())
+
+
+def moved(states, one, by):
+    count = states.geometry.solar_zenith.shape[0]
+    return changed(states, [one], jnp.full((count, 1), by))
+
+
+NAMES = [x for x in SHORT_NAMES if x not in ("vapour", "ozone")]
+
+
+@pytest.mark.parametrize("name", [*NAMES, *(f"{x}_C03" for x in BY_BAND)])
+def test_no_change_changes_nothing_and_a_step_moves_the_value(states, name):
+    one = declared(name, "smoke")
+    same = moved(states, one, 0.0)
+    if name != "aod_550":  # which keeps the depth, and moves it from the picture to the strength
+        for ours, theirs in zip(jax.tree.leaves(same), jax.tree.leaves(states), strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_allclose(one.value(same), one.value(states), rtol=1e-12)
+    step = moved(states, one, one.step)
+    assert one.holds(states).all() and one.units and one.long_name
+    if one.units == "1" and name in ("liquid_mass", "droplet_number"):
+        np.testing.assert_array_equal(one.value(states), 1)
+        path = f"atmosphere.liquid.{'mass' if name == 'liquid_mass' else 'number'}_path"
+        np.testing.assert_allclose(part(step, path), 1.1 * part(states, path), rtol=1e-12)
+    else:
+        np.testing.assert_allclose(one.value(step) - one.value(states), one.step, rtol=1e-7)
+
+
+def test_a_leaf_is_declared_by_its_place(states):
+    one = leaf("albedo.C02", 0.05)
+    assert (one.name, one.units) == ("albedo.C02", "1")
+    step = moved(states, one, 0.05)
+    np.testing.assert_allclose(step.albedo["C02"], np.asarray(states.albedo["C02"]) + 0.05)
+    assert (step.albedo["C01"] == states.albedo["C01"]).all()
+    assert not one.holds(moved(states, one, 2.0)).any()
+    every = factor("atmosphere.liquid", 0.1)
+    step = moved(states, every, 0.1)
+    for name in ("mass_path", "number_path"):
+        ours, theirs = (getattr(x.atmosphere.liquid, name) for x in (step, states))
+        np.testing.assert_allclose(ours, 1.1 * theirs, rtol=1e-12)
+    assert declared("atmosphere.pressure").units == "1"
+
+
+def test_what_there_is_not_is_told(states):
+    with pytest.raises(ValueError, match="no input 'depth'; choose from aod_550, ssa"):
+        declared("depth")
+    with pytest.raises(ValueError, match="ssa is of a plume"):
+        declared("ssa")
+    with pytest.raises(ValueError, match="ssa is of a plume"):
+        declared("ssa_C03")
+    with pytest.raises(ValueError, match="no atmosphere.plumes.dust.ssa: instead of 'dust' there"):
+        declared("ssa", "dust").change(states, jnp.zeros(6))
+    with pytest.raises(ValueError, match="a step is above 0; got 0"):
+        declared("albedo").stepping(0.0)
