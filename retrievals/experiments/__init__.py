@@ -10,6 +10,8 @@ from .independent_truth import draw_independent_truth as draw_independent_truth
 from .independent_truth import independent_truth as independent_truth
 from .known_albedo import draw_known_albedo as draw_known_albedo
 from .known_albedo import known_albedo as known_albedo
+from .over_stratus import draw_over_stratus as draw_over_stratus
+from .over_stratus import over_stratus as over_stratus
 from .saturated_fires import draw_saturated_fires as draw_saturated_fires
 from .saturated_fires import saturated_fires as saturated_fires
 from .tables import format_table as format_table
@@ -18,5 +20,6 @@ EXPERIMENTS = {
     "albedo": Experiment(known_albedo, draw_known_albedo),
     "truth": Experiment(independent_truth, draw_independent_truth),
     "fires": Experiment(saturated_fires, draw_saturated_fires),
+    "stratus": Experiment(over_stratus, draw_over_stratus),
 }
 """By the name that the command knows them by."""
