@@ -5,6 +5,8 @@ returns a Dataset with the table and all that its picture is drawn from; beside 
 function that draws. `EXPERIMENTS` names them for the command `abi-operator experiment`.
 """
 
+from .colour_of_ground import ash_colour as ash_colour
+from .colour_of_ground import draw_ash_colour as draw_ash_colour
 from .experiment import Experiment as Experiment
 from .independent_truth import draw_independent_truth as draw_independent_truth
 from .independent_truth import independent_truth as independent_truth
@@ -21,5 +23,6 @@ EXPERIMENTS = {
     "truth": Experiment(independent_truth, draw_independent_truth),
     "fires": Experiment(saturated_fires, draw_saturated_fires),
     "stratus": Experiment(over_stratus, draw_over_stratus),
+    "ash-colour": Experiment(ash_colour, draw_ash_colour),
 }
 """By the name that the command knows them by."""
