@@ -29,7 +29,11 @@ def experiment(
     ] = None,
     size: Annotated[
         int | None,
-        typer.Option(min=2, help="Rows and columns of an image, or the root of how many pixels."),
+        typer.Option(
+            min=4,
+            help="Rows and columns of an image; of truth the root of how many pixels, of "
+            "ash-colour how many grounds.",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = 0,
 ) -> None:

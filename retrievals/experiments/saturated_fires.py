@@ -33,7 +33,7 @@ KNOWN = ("as it is", "10 % errors", "its mean", "neighbours")
 """Albedo of the ground that the excess is counted from; or, instead, the pixels around."""
 RELATIVE_ERROR = 0.1
 BURNING = 0.08
-"""Share of the pixels in which something burns. [-]"""
+"""Share of the pixels in which something burns, of the bright and of the dark ones. [-]"""
 TEMPERATURE = (450.0, 600.0)
 """Of the fires; hotter ones stand out from any ground. [K]"""
 BEYOND = (1.02, 1.5)
@@ -72,7 +72,10 @@ def saturated_fires(*, size: int = 32, seed: int = 0, num_streams: int = 8) -> x
     num_pixels = size**2
     albedo = scenes.land_albedo(rng, size, BANDS[:1]).reshape(-1)
     warmth = _GROUND_TEMPERATURE + _SPREAD * scenes.random_field(rng, size).ravel()
-    burns = rng.permutation(num_pixels) < max(2, round(BURNING * num_pixels))
+    bright = albedo > np.median(albedo)
+    burns = np.zeros(num_pixels, bool)
+    for half in (np.flatnonzero(bright), np.flatnonzero(~bright)):
+        burns[rng.choice(half, max(1, round(BURNING * half.size)), replace=False)] = True
     temperature = rng.uniform(*TEMPERATURE, num_pixels)
     beyond = rng.uniform(*BEYOND, num_pixels)
     wrong = albedo * (1 + RELATIVE_ERROR * rng.standard_normal(num_pixels))

@@ -24,10 +24,12 @@ BASE = {"smoke": 1.5e3, "ash": 6e3}
 """Height of its lower edge. [m]"""
 THICKNESS = 1.5e3
 """Height of its upper edge above that. [m]"""
+NUM_LAYERS = 20
+"""Of the columns. [-]"""
 EXTENT = 128e3
 """Side of an image, however many pixels it has. [m]"""
 
-_TOP, _NUM_LAYERS = 40e3, 20  # of the levels [m]
+_TOP = 40e3  # of the levels [m]
 _SCALE_HEIGHT, _SURFACE_PRESSURE = 8e3, 1013.25e2  # [m], [Pa]
 _DEGREES = {"solar_zenith": 48.0, "view_zenith": 55.0, "relative_azimuth": 70.0}
 _INLAND = 80e3  # of the middle of the image of land, amid green hills and dry plains [m]
@@ -67,11 +69,11 @@ def clear_air(
     liquid: LiquidCloud | None = None,
 ) -> Atmosphere:
     """Air of 20 layers, thin ones below, without gases that absorb; and what else is in it."""
-    levels = _TOP * jnp.linspace(1, 0, _NUM_LAYERS + 1) ** 1.5
-    height = jnp.broadcast_to(levels, (num_pixels, _NUM_LAYERS + 1))
+    levels = _TOP * jnp.linspace(1, 0, NUM_LAYERS + 1) ** 1.5
+    height = jnp.broadcast_to(levels, (num_pixels, NUM_LAYERS + 1))
     pressure = _SURFACE_PRESSURE * jnp.exp(-height / _SCALE_HEIGHT)
     if liquid is None:
-        nothing = jnp.zeros((num_pixels, _NUM_LAYERS))
+        nothing = jnp.zeros((num_pixels, NUM_LAYERS))
         liquid = LiquidCloud(nothing, nothing)
     return Atmosphere(pressure, height, liquid, plumes or {})
 

@@ -43,14 +43,14 @@ def test_it_prints_a_table_and_writes_it_with_a_picture(run, tmp_path):
         ["0", "25"],
     ]
     folder = tmp_path / "new"
-    answer = run("count", "--output", folder, "--size", 3, "--seed", 4)
+    answer = run("count", "--output", folder, "--size", 6, "--seed", 4)
     assert answer.exit_code == 0, answer.output
     assert f"wrote {folder / 'count.png'}" in answer.output
     assert (folder / "count.png").read_bytes().startswith(b"\x89PNG")
     with xr.open_dataset(folder / "count.nc") as written:
-        assert written["pixels"].item() == 9
+        assert written["pixels"].item() == 36
         assert written.attrs["title"] == "How many pixels are there?"
-        assert written.attrs["source"].endswith(f"count --output {folder} --size 3 --seed 4")
+        assert written.attrs["source"].endswith(f"count --output {folder} --size 6 --seed 4")
 
 
 def test_without_matplotlib_it_says_so_before_it_starts(run, tmp_path, monkeypatch):
