@@ -223,7 +223,7 @@ def _reflectance_and_gradient(inputs, plan, how):
         of_slopes = plan.share_of_slopes(found.square, found.shared.layers.tau)
         share = jnp.maximum(of_slopes, plan.share(0.5 * value[None], jnp.abs(reflection)))
         # The mean is never the last by chance.
-        return carry, row, jnp.where(mode.order.mean > 0, jnp.inf, share)
+        return carry, row, jnp.where(mode.order.mean > 0, share.dtype.type(jnp.inf), share)
 
     nothing = jax.tree.map(jnp.zeros_like, (shared.view_secant, shared, inputs.ground))
     keep = layers.tau, num_nodes, doublings.most, faces is not None
