@@ -16,29 +16,37 @@ from forty_digits import forty_digit_radiance  # noqa: E402
 FLOOR = 1e-3
 
 
-def error(columns, row, num_streams, value):
-    """Error of one column's value, relative as in `stress_checks`; NaN where there is no truth."""
+def truth(columns, row, num_streams, albedo=None):
+    """Reflectance or radiance of one column, over ground of its own albedo or another.
+
+    NaN where 40 digits cannot be had.
+    """
     own = {name: np.asarray(x[row], np.float64) for name, x in columns.items()}
-    phase, mu0 = own.pop("phase_function"), float(own["mu0"])
-    solar, sources = own.pop("solar_irradiance", None), {}
-    for name in ("planck_levels", "surface_emission", "isotropic_top"):
-        if name in own:
-            sources[name] = own.pop(name)
-    irradiance = 1.0 if solar is None else float(solar)
+    solar = own.get("solar_irradiance")
+    if albedo is not None:
+        own["albedo"] = albedo
+    irradiance = {"solar_irradiance": 1.0 if solar is None else float(solar)}
     try:
-        truth = forty_digit_radiance(
-            **own,
-            num_streams=num_streams,
-            corrected=True,
-            solar_irradiance=irradiance,
-            phase_function=phase,
-            **sources,
-        )
+        found = forty_digit_radiance(**own | irradiance, num_streams=num_streams, corrected=True)
     except ArithmeticError:
         return np.nan
-    if solar is None:
-        truth, floor = np.pi * truth / mu0, FLOOR
-    else:
-        strongest = [sources["planck_levels"].max(), *(np.max(x) for x in sources.values())]
-        floor = FLOOR * max(*strongest, irradiance * mu0 / np.pi)
-    return abs(value - truth) / max(abs(truth), floor)
+    return np.pi * found / own["mu0"] if solar is None else found
+
+
+def error(columns, row, num_streams, value):
+    """Error of one column's value, relative as in `stress_checks`."""
+    right, floor = truth(columns, row, num_streams), FLOOR
+    if "planck_levels" in columns:
+        sources = ("planck_levels", "surface_emission", "isotropic_top")
+        sun = columns["solar_irradiance"][row] * columns["mu0"][row] / np.pi
+        floor = FLOOR * max(sun, *(np.max(columns[name][row]) for name in sources))
+    return abs(value - right) / max(abs(right), floor)
+
+
+def falls(columns, row, num_streams):
+    """Whether the equations themselves have a negative reflectance, or one that falls in albedo.
+
+    Few streams have, where phase functions are sharp.
+    """
+    black, own, white = (truth(columns, row, num_streams, a) for a in (0.0, None, 1.0))
+    return bool(black < 0 or black > own or own > white)

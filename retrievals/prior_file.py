@@ -1,6 +1,7 @@
 """Priors that a user writes down: a TOML file with one table for each quantity."""
 
 import dataclasses
+import sys
 import tomllib
 from pathlib import Path
 
@@ -10,6 +11,9 @@ from abi_operator.files import InputError
 
 from .quantities import Quantity
 from .state_vector import StateVector
+
+# An integer may be larger than any floating number.
+_LARGEST = sys.float_info.max
 
 DECLARED = "declared"
 """In place of a file: what the quantities' declarations say."""
@@ -59,11 +63,12 @@ def read_prior(path: str, vector: StateVector) -> StateVector:
 def _with(quantity: Quantity, table: object, path: str) -> Quantity:
     """A quantity with another prior."""
     name = quantity.name
-    words = f"the prior {path}: [{name}] needs numbers mean and sigma, sigma above 0"
+    words = f"the prior {path}: [{name}] needs numbers mean and sigma, sigma above 0 and finite"
     if not isinstance(table, dict) or set(table) != {"mean", "sigma"}:
         raise InputError(f"{words}; got {table}.")
     mean, sigma = table["mean"], table["sigma"]
-    if not all(isinstance(x, int | float) for x in (mean, sigma)) or not sigma > 0:
+    numbers = all(type(x) in (int, float) for x in (mean, sigma))
+    if not numbers or not 0 < sigma < _LARGEST or abs(mean) > _LARGEST:
         raise InputError(f"{words}; got {table}.")
     x = quantity.transform.x(jnp.asarray(mean, float))
     if not jnp.isfinite(x):

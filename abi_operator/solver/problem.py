@@ -26,6 +26,7 @@ from .method.delta_m import delta_m as scale_delta_m
 from .method.doublings import layer_doublings, within_reach
 from .method.ground import isotropic, lambertian, reflecting
 from .method.legendre import legendre_series
+from .method.rounding import within_single_precision
 from .method.single_scatter import (
     cos_scattering_angle,
     direct_transmission,
@@ -59,6 +60,9 @@ class Problem:
             limits = secants, num_streams, options.num_doublings
             tau = self.layers.tau * within_reach(self.layers.tau, *limits)
             self.layers = self.layers._replace(tau=tau)
+        if self.layers.tau.dtype == jnp.float32:
+            factor = within_single_precision(self.layers.tau, self.layers.coalbedo)
+            self.layers = self.layers._replace(tau=self.layers.tau * factor)
         self.doublings = layer_doublings(
             self.layers.tau, secants, num_streams, options.num_doublings
         )

@@ -166,7 +166,8 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
     t, w, f = tau[0], alike.scattered[0], alike.forward[0]
     faces = None if planck is None else (planck[1:-1], planck[2:])
     warmth = (None, None) if planck is None else (planck[0], jnp.abs(planck[1] - planck[0]))
-    start = _Group(t, w * t, f * t, 0 * t, 0 * t, 0 * t, *warmth)
+    # Numbers of groups are those of a tile: a column that is no number has them, too.
+    start = _Group(t, w * t, f * t, 0 * t, 0 * t, jnp.zeros_like(t), *warmth)
     layers = tau[1:], alike.scattered[1:], alike.forward[1:], faces
     _, labels = jax.lax.scan(step, start, layers)
     return jnp.concatenate([start.label[None], labels])

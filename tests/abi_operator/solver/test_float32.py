@@ -126,6 +126,31 @@ def test_gradients_are_finite_at_every_hard_place():
         assert finite.all(), f"{name}: {[n for n, ok in zip(names, finite, strict=True) if not ok]}"
 
 
+def conservative_columns(depth, count=64, layers=16, num_streams=4):
+    """Nothing is absorbed in them, nor by the ground."""
+    rng = np.random.default_rng(3)
+    tau = depth * rng.dirichlet(np.ones(layers), count)
+    moments = rng.uniform(0, 0.8, (count, layers, 1)) ** np.arange(num_streams + 1)
+    mu0, mu = rng.uniform(0.05, 1, (2, count))
+    columns = tau, np.ones_like(tau), moments, np.ones(count), mu0, mu, rng.uniform(0, np.pi, count)
+    return [np.asarray(x, np.float32) for x in columns]
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize(("depth", "right"), [(10, 1e-5), (1e3, 5e-4), (3e5, None)])
+def test_depth_without_absorption_is_right_or_refused(depth, right):
+    """The more of it, the more rounding weighs; where it is all, there is no number."""
+    columns = conservative_columns(depth)
+    single = np.asarray(toa_brf(*columns, num_streams=4, num_doublings=14))
+    assert single.dtype == np.float32
+    if right is None:
+        assert np.isnan(single).all()
+        return
+    with jax.enable_x64(True):
+        double = np.asarray(toa_brf(*as_double(columns), num_streams=4, num_doublings=14))
+    assert np.max(abs(single / double - 1)) < right
+
+
 @pytest.mark.parametrize("error_budget", [None, 1e-3])
 def test_gradients_never_compute_in_float64(error_budget):
     columns = [jnp.asarray(x, jnp.float32) for x in simple_columns()]

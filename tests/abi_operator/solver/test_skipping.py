@@ -87,6 +87,18 @@ def test_a_larger_budget_is_spent():
     assert spent[0] > spent[1] > spent[2] > 1e-12
 
 
+@pytest.mark.parametrize("name", ["tau", "ssa", "moments"])
+def test_a_column_that_is_no_number_moves_no_other(name):
+    """Layers of a tile are grouped for all its columns together."""
+    given, others = dict(columns()), np.arange(96) != 5
+    given[name] = given[name].copy()
+    given[name][5] = np.nan
+    how = {"num_streams": STREAMS, "error_budget": 1e-3, "check_values": False}
+    found = np.asarray(toa_brf(**given, **how))
+    assert np.isnan(found[5])
+    np.testing.assert_allclose(found[others], solved(1e-3)[others], rtol=1e-5)
+
+
 @pytest.mark.parametrize("error_budget", [1e-2, 1e-3])
 def test_slopes_of_members_are_their_own(error_budget):
     """1 % of a column's slopes, those in each of its layers among them, in 99 of 100 columns."""

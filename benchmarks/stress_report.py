@@ -1,0 +1,92 @@
+"""What `stress.py` prints of the columns that it asked."""
+
+import numpy as np
+from rounds import table
+from stress_checks import CHECKS, LIMITS
+from stress_columns import STRATA
+
+PRECISIONS = ("float64", "float32")
+# Streams, layers at most and at least, whether they emit, columns of a batch, share of all columns.
+# What takes longest to compile comes first.
+GROUPS = (
+    (64, 4, 2, False, 8, 0.0005),
+    (32, 16, 5, False, 51, 0.0045),
+    (16, 16, 5, False, 119, 0.0225),
+    (16, 64, 17, False, 119, 0.0225),
+    (8, 200, 65, False, 510, 0.10),
+    (8, 4, 2, True, 1020, 0.10),
+    (8, 16, 5, False, 1020, 0.15),
+    (4, 16, 5, True, 1020, 0.15),
+    (6, 4, 2, False, 1020, 0.15),
+    (4, 64, 17, False, 1020, 0.10),
+    (2, 16, 5, False, 1020, 0.10),
+    (2, 1, 1, False, 1020, 0.10),
+)
+# What the worst error of a check comes from, where nothing fails.
+DEPTH = "rounding, times the depth of layers that absorb nothing"
+LIMITED_BY = dict.fromkeys(CHECKS, "rounding") | {
+    "finite value": "",
+    "finite slopes": "",
+    "energy": DEPTH,
+    "reciprocity": DEPTH,
+    "slope": "the quotient: rounding of values over its step",
+    "inside jit": DEPTH + ", of light of one layer seen through them",
+    "budget": "light of ground hotter than its air, and on the top, which it does not count",
+    "float32": DEPTH,
+    "float32 slope": DEPTH,
+}
+SIGNS = ("not negative", "rising in albedo")
+
+
+def failed(rows, name, precision):
+    return np.nan_to_num(rows[name]) > LIMITS[name][PRECISIONS.index(precision)]
+
+
+def by_stratum(rows, precision):
+    names = [name for name in CHECKS if (~np.isnan(rows[name])).any()]
+    print("Columns by stratum, and how many failed each check:\n")
+    beyond = ["beyond single precision"] if precision == "float32" else []
+    lines = []
+    for k, stratum in [*enumerate(STRATA), (None, "all")]:
+        own = rows if k is None else rows[rows["stratum"] == k]
+        counts = [f"{failed(own, name, precision).sum()}" for name in names]
+        more = [f"{own['beyond'].sum()}"] if beyond else []
+        lines.append([stratum, f"{own.size}", *more, *counts])
+    table(["stratum", "columns", *beyond, *names], lines)
+
+
+def by_check(rows, where, precision):
+    print("Errors by check:\n")
+    lines = []
+    for name, meaning in CHECKS.items():
+        asked = ~np.isnan(rows[name])
+        if not asked.any():
+            continue
+        worst = int(np.nanargmax(rows[name]))
+        p50, p99, p999 = np.percentile(rows[name][asked], (50, 99, 99.9))
+        limit = LIMITS[name][PRECISIONS.index(precision)]
+        errors = [f"{x:.1e}" for x in (p50, p99, p999, rows[name][worst])]
+        passes = f"{limit:g}" if limit < np.inf else "any"
+        which = described(rows, where, worst) if rows[name][worst] else ""
+        counts = [passes, f"{failed(rows, name, precision).sum()}"]
+        lines.append([name, f"{asked.sum()}", *errors, *counts, which, LIMITED_BY[name], meaning])
+    head = ["check", "columns", "median", "p99", "p99.9", "worst", "passes to", "failed"]
+    table([*head, "the worst", "what limits it", "error of"], lines)
+
+
+def described(rows, where, i):
+    number, index, row = where[i]
+    streams, layers, _, emitting, *_ = GROUPS[number]
+    kind = " emitting" if emitting else ""
+    stratum = list(STRATA)[rows["stratum"][i]]
+    return f"{stratum}, {streams} streams, {layers}{kind} layers, batch {index} row {row}"
+
+
+def worst(rows, precision, count):
+    """Columns whose errors are largest beside what each check lets pass, most of them cheap."""
+    ratio = np.zeros(rows.size)
+    for name, limits in LIMITS.items():
+        limit = limits[PRECISIONS.index(precision)]
+        if 0 < limit < np.inf and name not in ("budget", "slope", "float32 slope"):
+            ratio = np.maximum(ratio, np.nan_to_num(rows[name]) / limit)
+    return np.argsort(-ratio, kind="stable")[:count]
