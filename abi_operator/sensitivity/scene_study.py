@@ -10,7 +10,6 @@ import xarray as xr
 
 from ..atmosphere import Fire, State
 from ..files import InputError
-from ..files.result import CONVENTIONS
 from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
 from ..scene import column_states, gases_of, species_of
 from ..scene.angles import sun_distance
@@ -19,7 +18,8 @@ from .declarations import declared
 from .derivatives import Function, Sensitivity, sensitivity
 from .inputs import Input
 from .outputs import FIRE_CONTRAST, bands_of, check_outputs, output_function
-from .variance import SampledVariance, covariance_of, sampled_variance, variance_parts
+from .study_dataset import SampledPixels, study_dataset
+from .variance import covariance_of, sampled_variance
 
 STANDARD_TEMPERATURE = 288.15
 """Of ground and air where a result has none and a fire is added: what they give off themselves is
@@ -118,12 +118,7 @@ def sensitivity_study(
             sampled = _sampled(function, states, inputs, found, covariance, sampling or Sampling())
     except ValueError as error:
         raise InputError(str(error)) from None
-    return _dataset(image, chosen, (of, inputs), found, covariance, sampled)
-
-
-class _Sampled(NamedTuple):
-    pixels: np.ndarray
-    variance: SampledVariance
+    return study_dataset(image, chosen, (of, inputs), found, covariance, sampled)
 
 
 def _sampled(
@@ -133,7 +128,7 @@ def _sampled(
     found: Sensitivity,
     covariance: np.ndarray,
     sampling: Sampling,
-) -> _Sampled | None:
+) -> SampledPixels | None:
     if not sampling.num_samples:
         return None
     rng = np.random.default_rng(sampling.seed)
@@ -142,7 +137,9 @@ def _sampled(
     some = jax.tree.map(lambda x: x[pixels], states)
     how = {"num_samples": sampling.num_samples, "seed": sampling.seed}
     jacobian = found.jacobian[pixels]
-    return _Sampled(pixels, sampled_variance(function, some, inputs, jacobian, covariance, **how))
+    return SampledPixels(
+        pixels, sampled_variance(function, some, inputs, jacobian, covariance, **how)
+    )
 
 
 def _input(one: str | Input, species: str | None, sigma: Mapping[str, float]) -> Input:
@@ -217,86 +214,3 @@ def settings_of_result(image: xr.Dataset) -> Settings:
 def sun_distance_of(image: xr.Dataset) -> float:
     """Distance of the sun at the time of a result, 1 where it has none. [AU]"""
     return sun_distance(image["time"].values) if "time" in image.variables else 1.0
-
-
-def _dataset(
-    image: xr.Dataset,
-    chosen: np.ndarray,
-    names: tuple[Sequence[str], Sequence[Input]],
-    found: Sensitivity,
-    covariance: np.ndarray,
-    sampled: _Sampled | None,
-) -> xr.Dataset:
-    of, inputs = names
-    rows, entries = ("of", "y", "x"), ("of", "to", "y", "x")
-    parts = variance_parts(found.jacobian, covariance)
-    fields = {
-        "value": (rows, found.value, "what is looked at"),
-        "input": (("to", "y", "x"), found.inputs, "what is changed, as it is"),
-        "jacobian": (entries, found.jacobian, "derivative"),
-        "elasticity": (entries, found.elasticity, "relative change for a relative change"),
-        "change_up": (entries, found.up, "change for one step up"),
-        "change_down": (entries, found.down, "change for one step down"),
-        "second_derivative": (entries, _diagonal(found.second), "second derivative"),
-        "variance": (rows, parts.sum(axis=-1), "variance to first order"),
-        "variance_part": (entries, parts, "part of the variance due to an input, to first order"),
-    }
-    if sampled is not None:
-        chosen_again = sampled.pixels, len(found.value)
-        by = sampled.variance
-        more = {
-            "sampled_variance": (rows, by.total, "variance by sampling"),
-            "sampled_variance_error": (rows, by.total_error, "its standard error"),
-            "sampled_linear": (rows, by.linear, "variance to first order of the same draws"),
-            "sampled_part": (entries, by.parts, "part of the variance by sampling"),
-            "sampled_part_error": (entries, by.parts_error, "its standard error"),
-            "sample_count": (("y", "x"), by.draws, "draws that count"),
-        }
-        fields |= {
-            name: (dims, _spread(values, *chosen_again), words)
-            for name, (dims, values, words) in more.items()
-        }
-    variables = {
-        name: (dims, _on_map(values, chosen), {"long_name": words})
-        for name, (dims, values, words) in fields.items()
-    }
-    variables["step"] = (
-        ("to",),
-        np.array([one.step for one in inputs]),
-        {"long_name": "finite step and standard deviation, in the unit of the input"},
-    )
-    variables["covariance"] = (("to", "with"), covariance, {"long_name": "of the inputs"})
-    short = [one.name for one in inputs]
-    coordinates = {
-        "of": ("of", list(of), {"long_name": "what is looked at"}),
-        "to": ("to", short, {"long_name": "what is changed"}),
-        "with": ("with", short, {"long_name": "what is changed"}),
-        "to_units": ("to", [one.units for one in inputs], {"long_name": "unit of the input"}),
-        "to_name": ("to", [one.long_name for one in inputs], {"long_name": "the input in words"}),
-    }
-    result = xr.Dataset(variables, coordinates)
-    kept = ("latitude", "longitude", "time", "crs", "y", "x")
-    result = result.assign_coords({name: image[name] for name in kept if name in image.variables})
-    if "time" in result.coords:
-        result["time"].attrs["units_metadata"] = "leap_seconds: none"
-    return result.assign_attrs(
-        {"Conventions": CONVENTIONS, "title": "Sensitivities of a scene's synthetic imagery"}
-    )
-
-
-def _on_map(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Of columns first to a map behind the other axes, NaN elsewhere."""
-    field = np.full((*values.shape[1:], *chosen.shape), np.nan)
-    field[..., chosen] = np.moveaxis(values, 0, -1)
-    return field
-
-
-def _spread(values: np.ndarray, pixels: np.ndarray, count: int) -> np.ndarray:
-    """Of some columns to all of them, NaN for others."""
-    full = np.full((count, *values.shape[1:]), np.nan)
-    full[pixels] = values
-    return full
-
-
-def _diagonal(second: np.ndarray) -> np.ndarray:
-    return np.diagonal(second, axis1=-2, axis2=-1)
