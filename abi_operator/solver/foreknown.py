@@ -39,7 +39,7 @@ def need(column: Column, options: Options) -> Float[Array, "*batch"]:
     alike = Alike(tau, ssa, ssa * moments)
     if column.planck_levels is not None:
         warm = _warm(column, known, tau, 1 - ssa, albedo)
-        known, alike = warm.known, alike._replace(planck=column.planck_levels, sun=warm.sun)
+        known, alike = warm.known, alike._replace(planck=column.planck_levels, light=warm.light)
     return company.need(alike, known, column.mu0, mu, options.error_budget)
 
 
@@ -80,6 +80,11 @@ def _warm(
     thermal = unscattered(tau, coalbedo, levels[:-1], jumps, secant, _FEW_STREAMS).up
     if column.surface_emission is not None:
         thermal = thermal + seen * column.surface_emission
+    light = sun
+    if column.surface_emission is not None:
+        light = light + jnp.abs(column.surface_emission - (1 - albedo) * levels[-1])
+    if column.isotropic_top is not None:
+        light = light + column.isotropic_top
     of_light = Expected(
         added=sun * known.added + levels[0],
         least=sun * known.least + thermal,
@@ -87,4 +92,4 @@ def _warm(
         aside=sun * known.aside,
         through=known.through,
     )
-    return jax.lax.stop_gradient(Warm(of_light, sun, levels, albedo * seen))
+    return jax.lax.stop_gradient(Warm(of_light, light, levels, albedo * seen))

@@ -52,8 +52,8 @@ def need(
     labels = group_labels(alike, Limits(0.5 * secants, allowed, float("inf")))
     depth = jnp.sum(alike.scattered * alike.tau, axis=0)
     twice = (depth / (1 + depth)) ** 2 * secants / (error_budget * known.least)
-    if alike.sun is not None:
-        twice = alike.sun * twice
+    if alike.light is not None:
+        twice = alike.light * twice
     tangents = jnp.sqrt((1 - mu0) / (1 + mu0) * (1 - mu) / (1 + mu))
     modes = jnp.log(jnp.maximum(twice, 1)) / -jnp.log(jnp.clip(tangents, _STRAIGHT, 1 - _STRAIGHT))
     share = modes / (1 + modes)

@@ -62,16 +62,17 @@ class Alike(NamedTuple):
     ----------
     tau, scattered, forward
         Optical depth, omega and omega g of each layer as it is solved. [-]
-    planck, sun
+    planck, light
         Of columns that emit, the Planck function at the upper face of each layer and at the ground,
-        and the radiance of a reflectance of 1; else None. [radiance unit]
+        and what comes upon the layers from above and from below (`heat.Warm`); else None. [radiance
+        unit]
     """
 
     tau: Float[Array, "layer *batch"]
     scattered: Float[Array, "layer *batch"]
     forward: Float[Array, "layer *batch"]
     planck: Float[Array, "level *batch"] | None = None
-    sun: Float[Array, "*batch"] | None = None
+    light: Float[Array, "*batch"] | None = None
 
 
 class Limits(NamedTuple):
@@ -135,8 +136,8 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
         difference = jnp.abs(group.scattered - w * depth) + jnp.abs(group.forward - f * depth)
         hidden = (1 + slant * depth) * (1 + slant * total) * (1 + ATTENUATION * group.above)
         loss = 0.5 * difference * slant * slant * t / hidden
-        if alike.sun is not None:
-            loss = alike.sun * loss
+        if alike.light is not None:
+            loss = alike.light * loss
         lost = group.lost + loss
         new = (lost > allowed) | ((slant * total > thickest) & (depth > 0))
         span, start, own_span = None, None, None

@@ -36,8 +36,10 @@ class Warm(NamedTuple):
     ----------
     known
         Of its radiance.
-    sun
-        Radiance of a reflectance of 1.
+    light
+        What comes upon the layers from outside: the radiance of a reflectance of 1, what falls on
+        the top, and by how much the ground shines more, or less, than it would at the temperature
+        of the air on it, of which layers that are as warm give back what they take.
     planck
         Planck function at the levels.
     returned
@@ -45,7 +47,7 @@ class Warm(NamedTuple):
     """
 
     known: Expected
-    sun: Float[Array, "*batch"]
+    light: Float[Array, "*batch"]
     planck: Float[Array, "level *batch"]
     returned: Float[Array, "*batch"]
 

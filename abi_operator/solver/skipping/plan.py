@@ -149,7 +149,7 @@ def planned(
         forward = layers.moments[1][:, 0] / 3
         alike = Alike(layers.tau, 1 - layers.coalbedo, forward)
         if warm is not None:
-            alike = alike._replace(planck=warm.planck, sun=warm.sun)
+            alike = alike._replace(planck=warm.planck, light=warm.light)
         groups = grouped(alike, Limits(secant, allowed, thickest))
         tau, rows = merged(groups, layers.tau, layers.rows())
         layers = layers.of_rows(tau, rows)
