@@ -46,22 +46,23 @@ CHECKS = {
     "float32": "single and double precision, of the same numbers in single precision",
     "float32 slope": "slope along one direction, likewise",
 }
-# What passes, in double and in single precision.
+# What passes, in double and in single precision, in which radiances of layers of 1e5 at a cosine of
+# 1e-3 are known to a tenth.
 LIMITS = {
     "finite value": (0.0, 0.0),
     "finite slopes": (0.0, 0.0),
-    "not negative": (1e-12, 1e-4),
+    "not negative": (1e-12, 1e-3),
     "rising in albedo": (1e-10, 1e-3),
     "energy": (1e-8, 1e-2),
     "absorption": (1e-10, 1e-3),
     "reciprocity": (1e-8, 1e-2),
     "jvp and vjp": (1e-10, 1e-4),
     "slope": (1e-2, np.inf),
-    "inside jit": (1e-6, 1e-2),
+    "inside jit": (1e-6, 0.2),
     "slopes inside jit": (1e-6, 1e-1),
     "budget": (np.inf, np.inf),
-    "float32": (np.inf, 1e-2),
-    "float32 slope": (np.inf, 1e-1),
+    "float32": (np.inf, 0.2),
+    "float32 slope": (np.inf, 0.3),
 }
 
 

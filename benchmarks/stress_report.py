@@ -32,8 +32,8 @@ LIMITED_BY = dict.fromkeys(CHECKS, "rounding") | {
     "slope": "the quotient: rounding of values over its step",
     "inside jit": DEPTH + ", of light of one layer seen through them",
     "budget": "light of ground hotter than its air, and on the top, which it does not count",
-    "float32": DEPTH,
-    "float32 slope": DEPTH,
+    "float32": "rounding, times optical depth over the cosine of the view",
+    "float32 slope": "rounding, times optical depth over the cosine of the view",
 }
 SIGNS = ("not negative", "rising in albedo")
 
