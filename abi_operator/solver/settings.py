@@ -31,8 +31,7 @@ class Settings(NamedTuple):
         be made on top of what the streams leave: layers that are alike are solved as one, azimuth
         modes and doublings end where the rest is less (`skipping`). 1e-3 is a good one. None solves
         everything, and so do second derivatives, and of columns that emit derivatives, several
-        views, and grounds other than Lambertian. Not counted is the light of a ground hotter than
-        the air over it, a fire, nor light that falls on the top: those solve without a budget.
+        views, and grounds other than Lambertian.
     check_values
         Whether to refuse values out of range (`ranges.SOLVER`; see `checks`). None checks what lies
         in memory, which takes a hundredth of the time that solving does: not what is traced inside

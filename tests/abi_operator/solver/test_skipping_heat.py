@@ -60,6 +60,26 @@ def test_radiances_are_within_the_budget(error_budget):
     assert wrong[clear].max() < 0.5 * error_budget
 
 
+def test_light_of_fires_below_and_on_the_top_is_counted():
+    """Of a ground far hotter than its air, which layers that scatter turn back and forth."""
+    rng = np.random.default_rng(1)
+    shape = (COLUMNS, LAYERS)
+    bright = 10 ** rng.uniform(0.5, 3, COLUMNS)
+    given = columns() | {
+        "tau": 10 ** rng.uniform(-4, 0, shape),
+        "ssa": rng.uniform(0.3, 1, shape),
+        "moments": rng.uniform(-0.2, 0.9, (*shape, 1)) ** np.arange(STREAMS + 1),
+        "surface_emission": bright,
+    }
+    for light in ({}, {"isotropic_top": 5.0}):
+        whole, found = (
+            np.asarray(toa_radiance(**given, **light, num_streams=STREAMS, error_budget=budget))
+            for budget in (None, 1e-3)
+        )
+        wrong = np.abs(found - whole) / whole
+        assert 0 < np.quantile(wrong, 0.99) < 1e-3 and wrong.max() < 1e-2
+
+
 def test_slopes_are_those_of_every_layer():
     def total(arguments, error_budget):
         return jnp.sum(toa_radiance(**arguments, num_streams=STREAMS, error_budget=error_budget))
