@@ -59,7 +59,7 @@ LIMITS = {
     "jvp and vjp": (1e-10, 1e-4),
     "slope": (1e-2, np.inf),
     "inside jit": (1e-6, 0.2),
-    "slopes inside jit": (1e-6, 1e-1),
+    "slopes inside jit": (1e-6, 0.2),
     "budget": (np.inf, np.inf),
     "float32": (np.inf, 0.2),
     "float32 slope": (np.inf, 0.3),
