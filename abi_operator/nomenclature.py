@@ -216,9 +216,13 @@ OPTIONAL_RESULT: dict[str, Variable] = {
     "brightness_temperature": Variable(
         HORIZONTAL, "K", "brightness temperature in C07", "toa_brightness_temperature"
     ),
+}
+"""What the result has where C07 is simulated."""
+
+OBSERVED: dict[str, Variable] = {
     "saturated": Variable(("band", "y", "x"), "1", "1 where the imager could tell no more"),
 }
-"""What the result has where C07 is simulated, and where it was observed."""
+"""What the result has besides where it was observed."""
 
 QUALITY_FLAGS: dict[str, int] = {
     "grazing_sun": 1,  # solar zenith angle above 80 degrees: plane-parallel air is a poor model
@@ -242,7 +246,17 @@ LARGEST_SHARE_OUTSIDE = 0.1
 
 def variable(name: str) -> Variable | None:
     """Look a Dataset variable up by name; None where the project does not define it."""
-    for table in (RESULT, SCENARIO, OPTIONAL, GROUND, FIRE, OPTIONAL_RESULT, MODEL, BY_BAND):
+    for table in (
+        RESULT,
+        SCENARIO,
+        OPTIONAL,
+        GROUND,
+        FIRE,
+        OPTIONAL_RESULT,
+        OBSERVED,
+        MODEL,
+        BY_BAND,
+    ):
         if name in table:
             return table[name]
     owner, _, quantity = name.partition("_")

@@ -232,6 +232,7 @@ def test_other_classes_and_mie_plumes_are_seen():
         assert np.sum(hydrometeor.mass_path) > 0, name
 
 
+@pytest.mark.slow
 def test_graupel_of_another_asymmetry(monkeypatch):
     """By 0.001, in the column that has graupel."""
     column = {FROZEN: guard.standard_columns()[FROZEN]}

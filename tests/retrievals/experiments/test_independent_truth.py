@@ -7,6 +7,7 @@ from retrievals.experiments import independent_truth
 from retrievals.experiments.independent_truth import _drawn, _uneven
 
 
+@pytest.mark.slow
 def test_a_covariance_of_the_forward_model_widens_the_error_bars():
     table = independent_truth(size=6, seed=1, kinds=["smoke"], true_streams=4, num_streams=2)
     assert (table["num_pixels"] >= 35).all()
