@@ -7,7 +7,7 @@ from ..files import InputError
 from ..radiance import THERMAL
 from .albedo_file import albedo_of_file, check_extent
 from .emissivity import Emissivity, check_emissivity, thermal_albedo
-from .grounds import FROM_MODEL, OceanWind, check_ocean_wind, sea_albedo, wind_speed
+from .grounds import FROM_MODEL, OceanWind, check_ocean_wind, limited_wind, sea_albedo
 from .land import LandAlbedo, check_land_albedo, with_last_resort
 from .snow_and_ice import IceAlbedo, check_ice_albedo, sea_ice_cover, with_snow_and_ice
 
@@ -116,7 +116,7 @@ def _albedo_of_water(
     if ocean_wind is None:
         return None if ocean_albedo is None else (ocean_albedo, f"{ocean_albedo:g}")
     check_ocean_wind(ocean_wind, model)
-    wind, _ = wind_speed(model, ocean_wind)
+    wind = limited_wind(model, ocean_wind)
     name = "the model's" if ocean_wind == FROM_MODEL else f"{ocean_wind:g} m/s"
     return np.stack([sea_albedo(band, wind) for band in bands]), f"rough by a wind of {name}"
 

@@ -21,6 +21,7 @@ from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
 from ..scene import classes_of, column_states, gases_of, species_of
 from ..settings import Settings
 from .green_change import NearInfrared, green_fields
+from .place import with_place
 from .plume_band import PlumeBand
 from .ssa_root import ssa_for_mean, ssa_of_each
 
@@ -123,10 +124,7 @@ def _study(
         "recipe": ("recipe", recipes, {"long_name": "how green is derived"}),
     }
     result = xr.Dataset(fields, coordinates)
-    kept = ("latitude", "longitude", "time", "crs", "y", "x")
-    result = result.assign_coords({name: image[name] for name in kept if name in image.variables})
-    if "time" in result.coords:
-        result["time"].attrs["units_metadata"] = "leap_seconds: none"
+    result = with_place(result, image)
     return result.assign_attrs(
         {
             "Conventions": CONVENTIONS,

@@ -9,6 +9,7 @@ import xarray as xr
 from ..files.result import CONVENTIONS
 from .derivatives import Sensitivity
 from .inputs import Input
+from .place import with_place
 from .variance import SampledVariance, variance_parts
 
 
@@ -86,10 +87,7 @@ def study_dataset(
         "to_name": ("to", [one.long_name for one in inputs], {"long_name": "the input in words"}),
     }
     result = xr.Dataset(variables, coordinates)
-    kept = ("latitude", "longitude", "time", "crs", "y", "x")
-    result = result.assign_coords({name: image[name] for name in kept if name in image.variables})
-    if "time" in result.coords:
-        result["time"].attrs["units_metadata"] = "leap_seconds: none"
+    result = with_place(result, image)
     return result.assign_attrs(
         {"Conventions": CONVENTIONS, "title": "Sensitivities of a scene's synthetic imagery"}
     )
