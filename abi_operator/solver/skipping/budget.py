@@ -6,8 +6,9 @@ of that which `LEAST_BRF` would have, where it is less. Layers are merged until 
 `OF_MERGING` is estimated to be lost at a group of them (`grouping`). A column's azimuth modes end
 where they count less than b times `OF_MODES`, and those but the mean are left out that are
 expected to be less than b times `OF_NO_MODES` (`mode_sum`). A layer's doublings leave b times
-`OF_DOUBLINGS` of its own response (`doublings`). These shares were fitted on columns of other
-seeds than those that `benchmarks/skipping.py` judges them by.
+`OF_DOUBLINGS` of its own response (`doublings`). These shares were fitted by
+`benchmarks/fit_budget.py` on columns of other seeds than those that `benchmarks/skipping.py` judges
+them by, so that the worst of five seeds leaves a third of the budget.
 
 Groups and modes are each column's own. Of doublings a layer has as many as that column of its tile
 asks for that needs most: what a column gets depends on those that it is solved with by about a
@@ -22,10 +23,10 @@ from jaxtyping import Array, Float
 
 LEAST_BRF = 0.01
 """Smallest reflectance that an error is compared with. [-]"""
-OF_MERGING = 0.5
+OF_MERGING = 0.35
 """Share of the budget that a group of merged layers may be estimated to lose, and to misplace of
 thermal light that it scatters."""
-OF_MODES = 0.5
+OF_MODES = 0.2
 """Share of the budget below which an azimuth mode is the last one."""
 OF_DOUBLINGS = 0.2
 """Share of the budget that a layer's response may be off by."""
@@ -36,7 +37,7 @@ OF_MODES_OF_SLOPES = 3e-4
 of a high degree are much the same in every mode, and many small ones add up to 1 %."""
 OF_NO_MODES = 0.1
 """Share of the budget below which all modes but the mean are expected to stay."""
-DECAY = 0.15
+DECAY = 0.3
 """Ratio of neighbouring modes' sizes, to see a small one by chance for what it is."""
 OF_SLOPES = 2e-3
 """The budget of programs for slopes, at most: a column's slopes keep about 1 % whatever else."""

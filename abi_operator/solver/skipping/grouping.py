@@ -5,9 +5,11 @@ as apart but for the order in which light meets them. Of light that goes down an
 that is
 
 .. math:: \frac{|\Delta|}{2}\,\frac{sT}{1+sT}\,\frac{st}{1+s(T+t)}, \qquad
-   |\Delta| = |\Delta\omega| + |\Delta(\omega g)|,
+   |\Delta| = |\Delta\omega| + |\Delta(\omega g)| + |\Delta(\omega\chi_k)|,
 
-the first moment of what differs, with rational functions in place of exponentials. From the top,
+the first moment of what differs and one of half the streams' degree k, since layers with different
+phase functions may have one g (delta-M brings those of droplets of other sizes together), with
+rational functions in place of exponentials. From the top,
 each layer joins the group above it while the sum of this over the group's members, seen through
 what lies above (1 / (1 + `ATTENUATION` times its backward depth)), stays below what the error
 budget allows; else it starts a new group.
@@ -62,6 +64,8 @@ class Alike(NamedTuple):
     ----------
     tau, scattered, forward
         Optical depth, omega and omega g of each layer as it is solved. [-]
+    further
+        Omega times the moment of half the streams' degree, where it is looked at. [-]
     planck, light
         Of columns that emit, the Planck function at the upper face of each layer and at the ground,
         and what comes upon the layers from above and from below (`heat.Warm`); else None. [radiance
@@ -71,6 +75,7 @@ class Alike(NamedTuple):
     tau: Float[Array, "layer *batch"]
     scattered: Float[Array, "layer *batch"]
     forward: Float[Array, "layer *batch"]
+    further: Float[Array, "layer *batch"] | None = None
     planck: Float[Array, "level *batch"] | None = None
     light: Float[Array, "*batch"] | None = None
 
@@ -121,6 +126,7 @@ class _Group(NamedTuple):
     tau: Array
     scattered: Array
     forward: Array
+    further: Array | None
     lost: Array
     above: Array
     label: Array
@@ -130,10 +136,12 @@ class _Group(NamedTuple):
 
 def _labels(alike: Alike, slant, allowed, thickest, turned):
     def step(group: _Group, layer):
-        t, w, f, faces = layer
+        t, w, f, q, faces = layer
         depth, total = group.tau, group.tau + t
-        # Differences of omega and omega g, times T: one quotient in all, as they take long.
+        # Differences of omega and so on, times T: one quotient in all, as they take long.
         difference = jnp.abs(group.scattered - w * depth) + jnp.abs(group.forward - f * depth)
+        if group.further is not None:
+            difference = difference + jnp.abs(group.further - q * depth)
         hidden = (1 + slant * depth) * (1 + slant * total) * (1 + ATTENUATION * group.above)
         loss = 0.5 * difference * slant * slant * t / hidden
         if alike.light is not None:
@@ -151,6 +159,7 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
             total,
             group.scattered + w * t,
             group.forward + f * t,
+            None if group.further is None else group.further + q * t,
             lost,
             group.above,
             group.label,
@@ -159,7 +168,8 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
         )
         backward = jnp.maximum(depth - group.forward, 0)
         above = group.above + backward
-        fresh = _Group(t, w * t, f * t, 0 * t, above, group.label + 1, start, own_span)
+        own = None if q is None else q * t
+        fresh = _Group(t, w * t, f * t, own, 0 * t, above, group.label + 1, start, own_span)
         group = jax.tree.map(lambda x, y: jnp.where(new, x, y), fresh, joined)
         return group, group.label
 
@@ -168,7 +178,9 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
     faces = None if planck is None else (planck[1:-1], planck[2:])
     warmth = (None, None) if planck is None else (planck[0], jnp.abs(planck[1] - planck[0]))
     # Numbers of groups are those of a tile: a column that is no number has them, too.
-    start = _Group(t, w * t, f * t, 0 * t, 0 * t, jnp.zeros_like(t), *warmth)
-    layers = tau[1:], alike.scattered[1:], alike.forward[1:], faces
+    further = None if alike.further is None else alike.further[0] * t
+    start = _Group(t, w * t, f * t, further, 0 * t, 0 * t, jnp.zeros_like(t), *warmth)
+    rest = None if alike.further is None else alike.further[1:]
+    layers = tau[1:], alike.scattered[1:], alike.forward[1:], rest, faces
     _, labels = jax.lax.scan(step, start, layers)
     return jnp.concatenate([start.label[None], labels])

@@ -147,7 +147,7 @@ def planned(
         secant = 0.5 * (layers.sun_secants[0] + jnp.max(view_secants, axis=0))
         allowed = budget.OF_MERGING * error_budget * known.least
         forward = layers.moments[1][:, 0] / 3
-        alike = Alike(layers.tau, 1 - layers.coalbedo, forward)
+        alike = Alike(layers.tau, 1 - layers.coalbedo, forward, _middle(layers))
         if warm is not None:
             alike = alike._replace(planck=warm.planck, light=warm.light)
         groups = grouped(alike, Limits(secant, allowed, thickest))
@@ -159,6 +159,13 @@ def planned(
     share = budget.OF_DOUBLINGS if warm is None else budget.OF_DOUBLINGS_WARM
     doublings = layer_doublings(layers.tau, secants, num_streams, most, share * error_budget)
     return Plan(layers, doublings, given, groups, known, error_budget)
+
+
+def _middle(layers: LayersOfModes) -> Float[Array, "layer *batch"] | None:
+    """Omega chi_k of k half the streams, of which `moments` has the even and the odd (2k + 1)-fold;
+    None where that is g or nothing."""
+    k = layers.moments[0].shape[1]
+    return layers.moments[k % 2][:, k // 2] / (2 * k + 1) if k > 1 else None
 
 
 def over_layers(

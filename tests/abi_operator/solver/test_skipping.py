@@ -99,7 +99,7 @@ def test_a_column_that_is_no_number_moves_no_other(name):
     np.testing.assert_allclose(found[others], solved(1e-3)[others], rtol=1e-5)
 
 
-@pytest.mark.parametrize("error_budget", [1e-2, 1e-3])
+@pytest.mark.parametrize("error_budget", [pytest.param(1e-2, marks=pytest.mark.slow), 1e-3])
 def test_slopes_of_members_are_their_own(error_budget):
     """1 % of a column's slopes, those in each of its layers among them, in 99 of 100 columns."""
     exact, found = slopes(None), slopes(error_budget)
@@ -226,6 +226,18 @@ def test_alike_layers_are_one_group():
     assert groups.number == 1 and not groups.labels.any()
     other = same.at[LAYERS // 2 :].set(0.1)
     groups = grouped(Alike(tau, other, 0.5 * other), limits)
+    assert groups.number == 2
+    np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
+
+
+def test_layers_that_share_g_and_no_more_stay_apart():
+    """Droplets of two sizes: delta-M brings their g together, and not their further moments."""
+    tau, _ = layers()
+    same, further = 0 * tau + 1, jnp.where(jnp.arange(LAYERS)[:, None] < LAYERS // 2, 0.1, 0.2)
+    limits = Limits(jnp.full(5, 2.0), jnp.full(5, 1e-4), np.inf)
+    alike = Alike(tau, same, 0.75 * same)
+    assert grouped(alike, limits).number == 1
+    groups = grouped(alike._replace(further=further * same), limits)
     assert groups.number == 2
     np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
 

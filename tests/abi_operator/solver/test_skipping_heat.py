@@ -125,7 +125,7 @@ def test_layers_that_scatter_their_own_light_stay_apart():
     limits = Limits(jnp.full(1, 2.0), jnp.full(1, 1e-2), np.inf)
 
     def labels(ssa):
-        alike = Alike(tau, ssa * tau, 0 * tau, planck, jnp.ones(1))
+        alike = Alike(tau, ssa * tau, 0 * tau, None, planck, jnp.ones(1))
         return np.asarray(grouped(alike, limits).labels)[:, 0]
 
     np.testing.assert_array_equal(labels(1e-4), 0)
