@@ -164,6 +164,7 @@ def test_simulate_does_what_demo_does(invoke, tmp_path, inputs):
             np.testing.assert_array_equal(ours["brf"], theirs["brf"])
 
 
+@pytest.mark.slow
 def test_the_demonstration_can_be_of_ash(invoke, tmp_path):
     """With light of 0.555 um, and without a retrieval of smoke."""
 

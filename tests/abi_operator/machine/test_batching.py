@@ -106,6 +106,7 @@ np.testing.assert_allclose(shared, program(*given), rtol=1e-13)
 """
 
 
+@pytest.mark.slow
 def test_two_devices_share_the_tiles_under_every_transformation():
     """In a process of its own: how many devices there are is settled when JAX is first used."""
     settings = {"JAX_NUM_CPU_DEVICES": "2", "JAX_ENABLE_X64": "1", "JAX_PLATFORMS": "cpu"}

@@ -354,7 +354,7 @@ def solver_columns(count):
     return [jnp.asarray(x) for x in small_columns(count)]
 
 
-@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize("several", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_solver_mapped_is_the_batch_in_value_and_gradient(several):
     """With one view and with two: compiled as a whole of more columns than a tile has, and as the
     batch in chunks.

@@ -65,6 +65,7 @@ def test_a_gpu_gives_what_a_cpu_gives(num_streams, tmp_path):
         assert_close(value_and_gradient(dtype, num_streams), expected, dtype)
 
 
+@pytest.mark.slow
 def test_the_comparison_itself(tmp_path):
     """Of this CPU with another process of it, so that it works where a GPU is."""
     expected = by_cpu(tmp_path / "cpu.npz", 4)
