@@ -1,4 +1,4 @@
-"""Ice crystals in NumPy: power laws of Mitchell (1996), efficiencies by MADA, asymmetry by Fu.
+"""Ice crystals in NumPy: power laws of Mitchell (1996), efficiencies by MADA, two lobes after Fu.
 
 Means over the sizes of crystals are sums and not gamma functions. Photon paths of crystals are
 given to the theory of spheres by the gamma distribution of the same mean and variance, weighted by
@@ -8,6 +8,7 @@ area, which is the package's own closure. Its indices and Fu's coefficients are 
 import numpy as np
 from independent_droplets import gamma_mean, mean_efficiencies
 
+from abi_operator.bands import BANDS
 from abi_operator.optics.ice_tables import FU, ICE_INDEX
 
 ICE_DENSITY = 0.917  # [g cm-3]
@@ -40,7 +41,11 @@ def photon_paths(inverse_slope_um):
 
 
 def crystals(mass_path, inverse_slope_um, band):
-    """Extinction and scattering depth and asymmetry factor of a layer of columns. [-]
+    """Extinction and scattering depth of a layer of columns, and lobes of scattering. [-]
+
+    Half the extinction is diffracted, into a lobe of asymmetry 1 - lambda / (pi^2 r); the rest has
+    an asymmetry that with Fu's own single-scattering albedo makes Fu's asymmetry factor. Lobes are
+    pairs of a weight and an asymmetry factor.
 
     Parameters
     ----------
@@ -59,5 +64,12 @@ def crystals(mass_path, inverse_slope_um, band):
     size = 2 / np.sqrt(3) * path  # generalized effective size of Fu (1996)
     if not 25 <= size <= 125:
         raise ValueError(f"Fu's fit is bent at the ends of its range; got {size:.1f} um.")
-    asymmetry = np.polynomial.polynomial.polyval(size, FU[band].asymmetry)
-    return area * q_ext, area * (q_ext - q_abs), asymmetry
+    whole, coalbedo = (
+        np.polynomial.polynomial.polyval(size, c) for c in (FU[band].asymmetry, FU[band].coalbedo)
+    )
+    diffracted = 1 - BANDS[band].wavelength_um / (np.pi**2 * radius)
+    # With Q = 2 scattered are 2 (1 - coalbedo), of which 1 is diffracted.
+    rest = (2 * (1 - coalbedo) * whole - diffracted) / (2 * (1 - coalbedo) - 1)
+    share = 0.5 * q_ext / (q_ext - q_abs)
+    lobes = (share, diffracted), (1 - share, rest)
+    return area * q_ext, area * (q_ext - q_abs), lobes

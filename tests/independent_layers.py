@@ -45,6 +45,17 @@ def henyey_greenstein(asymmetry):
     return asymmetry ** np.arange(NUM_MOMENTS)
 
 
+def lobes(weights_and_asymmetries):
+    """Moments and phase function of lobes of Henyey and Greenstein. [-]"""
+
+    def phase(cosine):
+        return sum(
+            w * (1 - g**2) / (1 + g**2 - 2 * g * cosine) ** 1.5 for w, g in weights_and_asymmetries
+        )
+
+    return sum(w * henyey_greenstein(g) for w, g in weights_and_asymmetries), phase
+
+
 def plume_layers(made, depth, brightness, base, top):
     """Depth of a plume at 550 nm in each layer. [-]"""
     return depth * brightness * plumes.share_of_layers(made["height"], base, top)
@@ -74,7 +85,9 @@ def parts(made, band, *, mie_phase=mie_tables.phase, liquid_optics="mie"):
         for layer in np.flatnonzero(numbers[0]):
             only = np.eye(air.size)[layer]
             extinction, scattering, *phase = of_layer(*numbers[:, layer], band)
-            if len(phase) == 1:
+            if of_layer is ice.crystals:
+                phase = lobes(*phase)
+            elif len(phase) == 1:
                 phase = (henyey_greenstein(*phase),)
             found.append(Part(only * extinction, only * scattering, *phase))
     return found

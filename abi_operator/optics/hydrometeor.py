@@ -11,102 +11,36 @@ from jaxtyping import Array, Float
 from .._numerics import safe_divide
 from ..atmosphere import Atmosphere, Hydrometeor
 from ..bands import AnyBand, Band, OneOf, constants, first_missing, one_of
-from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
 from . import rain, rough_ice, water
 from .anomalous_diffraction import Matter, matter, mean_efficiencies
 from .cloud import fitted_radii_um, liquid_cloud
-from .droplets import LARGEST_RADIUS, NU, SMALLEST_RADIUS, effective_radius
-from .gamma import Habit, equivalent_shape, mean_mass_of_path, photon_path, sphere_habit
+from .diffraction import diffracted_share, diffraction_asymmetry
+from .droplets import effective_radius
+from .gamma import Habit, equivalent_shape, mean_mass_of_path, photon_path
+from .hydrometeor_classes import (
+    CLASSES,
+    RIMED_GEOMETRIC,
+    TWO_LOBES,
+    ClassOptics,
+    class_optics,
+    is_water,
+)
 from .ice import (
-    ROUGHENED_ASYMMETRY,
+    ROUGHENED_GEOMETRIC,
     SIZE_PER_PATH,
-    ice_asymmetry,
     ice_coalbedo,
+    ice_geometric_asymmetry,
     ice_mass_extinction,
 )
-from .ice_tables import CRYSTALS, FU, FU_RANGE_UM, ICE_DENSITY, ICE_INDEX, Fu
-from .phase import HenyeyGreenstein
+from .ice_tables import FU, FU_RANGE_UM, ICE_INDEX, Fu
+from .phase import HenyeyGreenstein, TwoTermHenyeyGreenstein
 from .pointwise import choose, pointwise
 
-HABITS: dict[str, Habit] = {
-    "drops": sphere_habit(WATER_DENSITY, WATER_DENSITY),
-    **CRYSTALS,
-    # Bulk densities of graupel and hail in the scheme of Morrison. [kg m-3]
-    "graupel": sphere_habit(400.0, ICE_DENSITY),
-    "hail": sphere_habit(900.0, ICE_DENSITY),
-}
-"""Shapes of particles by name."""
-
-# Asymmetry factor of graupel and hail, opaque lumps with a rough surface. [-] (An assumption,
-# between the 0.75 of roughened crystals and the 0.87 of smooth spheres in the visible.)
-RIMED_ASYMMETRY = 0.8
-# Tunnelling of crystals relative to spheres. [-] (0.6 to 0.8 by habit: D. L. Mitchell et al.,
-# "Testing and comparing the modified anomalous diffraction approximation", J. Atmos. Sci., 63,
-# 2948-2962, 2006, doi:10.1175/JAS3775.1; it moves extinction by 1 % or less from 20 um on)
-CRYSTAL_TUNNELLING = 0.7
-
-ASYMMETRIES = ("droplets", "rain", "fu1996", "baum2014", "roughened")
-EFFICIENCIES = ("mitchell", "fu1996")
 # Beyond a limit of size the logarithm of size goes on by this much at most. [-]
 _BEND = 0.5
 # Effective radius at which formulas are evaluated, to no effect, where there are no particles. [m]
 _IDLE_RADIUS = 3e-5
-
-
-class ClassOptics(NamedTuple):
-    """How one class of hydrometeor is seen.
-
-    Parameters
-    ----------
-    habit
-        Shape of the particles, or its name in `HABITS`.
-    nu
-        Shape of the gamma distribution of diameters. [-]
-    smallest_radius, largest_radius
-        Effective radii between which mass and number are believed. [m] Beyond, size bends smoothly
-        towards 1.65 times the limit, or its inverse, while mass stays what it is.
-    asymmetry
-        Asymmetry factor: a number, or one of ``"droplets"``, ``"rain"`` (Mie theory), ``"fu1996"``
-        (smooth hexagonal columns), ``"baum2014"`` (rough crystals of many habits),
-        ``"roughened"`` (0.75). [-]
-    efficiencies
-        Extinction and absorption by ``"mitchell"`` (modified anomalous diffraction) or, for ice,
-        ``"fu1996"`` (geometric optics of hexagonal columns of the same effective size).
-    internal_reflection, tunnelling_factor
-        Coefficient a1 of modified anomalous diffraction, None for that of spheres (1 in Mitchell
-        1996, 0.8 for plates), and tunnelling relative to spheres. [-]
-    """
-
-    habit: str | Habit
-    nu: float | Array
-    smallest_radius: float
-    largest_radius: float
-    asymmetry: str | float | Array
-    efficiencies: str = "mitchell"
-    internal_reflection: float | Array | None = None
-    tunnelling_factor: float | Array = 1.0
-
-
-def _ice(habit: str, nu: float, largest_radius: float) -> ClassOptics:
-    """Crystals, from an effective radius of 2 um. [m]"""
-    optics = ClassOptics(habit, nu, 2e-6, largest_radius, "fu1996")
-    return optics._replace(tunnelling_factor=CRYSTAL_TUNNELLING)
-
-
-CLASSES: dict[str, ClassOptics] = {
-    "cloud": ClassOptics("drops", NU, SMALLEST_RADIUS, LARGEST_RADIUS, "droplets"),
-    "drizzle": ClassOptics("drops", 1.0, 1e-5, 1e-3, "rain"),
-    "rain": ClassOptics("drops", 0.0, 1e-5, 5e-3, "rain"),
-    "ice": _ice("columns", 0.0, 5e-4),
-    "pristine": _ice("columns", 1.0, 5e-4),
-    "snow": _ice("aggregates", 0.0, 1e-3),
-    "aggregates": _ice("aggregates", 1.0, 1e-3),
-    "graupel": ClassOptics("graupel", 0.0, 1e-5, 1e-2, RIMED_ASYMMETRY),
-    "hail": ClassOptics("hail", 0.0, 1e-5, 3e-2, RIMED_ASYMMETRY),
-}
-"""What is assumed of each class; vary it by ``CLASSES | {"snow": CLASSES["snow"]._replace(...)}``.
-"""
 
 
 def hydrometeor(
@@ -120,8 +54,8 @@ def hydrometeor(
     .. math:: \tau = \frac{m\, \bar Q_\mathrm{ext}}{\rho\, \bar d}
 
     with the mean photon path d of the particles (`gamma`) and efficiencies by modified anomalous
-    diffraction, and the phase function of Henyey and Greenstein. A layer without mass or without
-    number is empty, with derivative 0.
+    diffraction, and phase functions of one or two lobes of Henyey and Greenstein. A layer without
+    mass or without number is empty, with derivative 0.
 
     Parameters
     ----------
@@ -146,12 +80,15 @@ def hydrometeor(
     if missing := first_missing(band.name, ICE_INDEX):
         raise ValueError(f"no index of ice and water for {missing!r}; have {list(ICE_INDEX)}.")
     particles = atmosphere.hydrometeors[name]
-    optics, habit = _class_optics(name, classes, particles)
+    optics, habit = class_optics(name, classes, particles)
     present, radius = _radius(particles, optics, habit)
     mass = jnp.where(present, particles.mass_path, 0)
-    cross_section, absorbed, asymmetry = _seen(radius, optics, habit, band)
-    extinction = mass * cross_section
-    scatterer = Scatterer(extinction - mass * absorbed, HenyeyGreenstein(asymmetry))
+    seen = _seen(radius, optics, habit, band)
+    extinction = mass * seen.extinction
+    phase = HenyeyGreenstein(seen.asymmetry)
+    if optics.asymmetry in TWO_LOBES:
+        phase = TwoTermHenyeyGreenstein(seen.lobe, seen.asymmetry, seen.share)
+    scatterer = Scatterer(extinction - mass * seen.absorption, phase)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 
@@ -167,7 +104,7 @@ def particle_radius(
     name, classes
         Name of the class, and what is assumed of each.
     """
-    present, radius = _radius(particles, *_class_optics(name, classes))
+    present, radius = _radius(particles, *class_optics(name, classes))
     return jnp.where(present, radius, 0)
 
 
@@ -189,7 +126,7 @@ def from_effective_radius(
     name, classes
         Name of the class, and what is assumed of each.
     """
-    optics, habit = _class_optics(name, classes)
+    optics, habit = class_optics(name, classes)
     present = effective_radius > 0
     log_path = jnp.log(jnp.where(present, effective_radius, _IDLE_RADIUS)) + math.log(4 / 3)
     number = mass_path * jnp.exp(-mean_mass_of_path(log_path, habit, optics.nu))
@@ -219,35 +156,12 @@ def outside_fitted_range(
     for name in sorted(atmosphere.hydrometeors):
         tau = hydrometeor(atmosphere, name, band, classes).tau[0]
         particles = atmosphere.hydrometeors[name]
-        optics, habit = _class_optics(name, classes, particles)
+        optics, habit = class_optics(name, classes, particles)
         _, radius = _radius(particles, optics, habit)
         smallest, largest = _fitted_radii(optics)
         total = total + jnp.sum(tau)
         outside = outside + jnp.sum(jnp.where((radius < smallest) | (radius > largest), tau, 0))
     return safe_divide(outside, total)
-
-
-def _class_optics(
-    name: str, classes: Mapping[str, ClassOptics], particles: Hydrometeor | None = None
-) -> tuple[ClassOptics, Habit]:
-    """Assumptions of a class, as its particles ask for them, and its habit, checked."""
-    if name not in classes:
-        raise ValueError(f"nothing is assumed of hydrometeor {name!r}; have {sorted(classes)}.")
-    optics = classes[name]
-    if particles is not None and (particles.optics, optics.asymmetry) == ("rough", "fu1996"):
-        optics = optics._replace(asymmetry="baum2014")
-    if isinstance(optics.habit, str) and optics.habit not in HABITS:
-        raise ValueError(f"no habit {optics.habit!r} (of {name!r}); have {list(HABITS)}.")
-    if isinstance(optics.asymmetry, str) and optics.asymmetry not in ASYMMETRIES:
-        raise ValueError(f"no asymmetry {optics.asymmetry!r} (of {name!r}); have {ASYMMETRIES}.")
-    habit = HABITS[optics.habit] if isinstance(optics.habit, str) else optics.habit
-    if optics.efficiencies not in EFFICIENCIES[: 1 if _is_water(habit) else 2]:
-        raise ValueError(f"no efficiencies {optics.efficiencies!r} for {name!r}: {EFFICIENCIES}.")
-    return optics, habit
-
-
-def _is_water(habit: Habit) -> bool:
-    return habit.density == WATER_DENSITY
 
 
 def _radius(particles: Hydrometeor, optics: ClassOptics, habit: Habit) -> tuple[Array, Array]:
@@ -279,13 +193,22 @@ def _bent_radius(
     return jnp.exp(log_radius)
 
 
-def _seen(
-    radius: Array, optics: ClassOptics, habit: Habit, band: AnyBand
-) -> tuple[Array, Array, Array]:
-    """Extinction and absorption per mass, and asymmetry factor, by effective radius. [m2 kg-1]"""
+class _Seen(NamedTuple):
+    """Extinction and absorption per mass [m2 kg-1], asymmetry factor of all scattered light or of
+    what is not diffracted, share of what is, and asymmetry factor of that. [-]"""
+
+    extinction: Array
+    absorption: Array
+    asymmetry: Array
+    share: Array
+    lobe: Array
+
+
+def _seen(radius: Array, optics: ClassOptics, habit: Habit, band: AnyBand) -> _Seen:
+    """What is seen of a class, by effective radius."""
     dtype, given = radius.dtype, optics.asymmetry
-    index = water.REFRACTIVE_INDEX if _is_water(habit) else ICE_INDEX
-    extinction, absorption, asymmetry = _of_radius(
+    index = water.REFRACTIVE_INDEX if is_water(habit) else ICE_INDEX
+    seen = _of_radius(
         radius,
         band.wavelength_um,
         constants(lambda name: matter(index[name]), band.name, dtype),
@@ -299,8 +222,9 @@ def _seen(
         habit.density,
     )
     if not isinstance(given, str):
-        asymmetry = jnp.broadcast_to(jnp.asarray(given, dtype), radius.shape)
-    return extinction, absorption, asymmetry
+        given = jnp.broadcast_to(jnp.asarray(given, dtype), radius.shape)
+        seen = seen._replace(asymmetry=given)
+    return seen
 
 
 @pointwise
@@ -312,7 +236,7 @@ def _of_radius(
     band: OneOf,
     optics: ClassOptics,
     density: float,
-) -> tuple[Array, Array, Array]:
+) -> _Seen:
     radius_um, size_um = 1e6 * radius, 1e6 * SIZE_PER_PATH * 4 / 3 * radius
     if optics.efficiencies == "fu1996":
         extinction = ice_mass_extinction(size_um, fits)
@@ -333,12 +257,15 @@ def _of_radius(
     elif optics.asymmetry == "rain":
         asymmetry = rain.rain_asymmetry(radius_um, band)
     elif optics.asymmetry == "fu1996":
-        asymmetry = ice_asymmetry(size_um, fits)
+        asymmetry = ice_geometric_asymmetry(size_um, fits, wavelength_um)
     elif optics.asymmetry == "baum2014":
-        asymmetry = rough_ice.rough_ice_asymmetry(radius_um, band)
+        asymmetry = rough_ice.rough_ice_geometric_asymmetry(radius_um, band)
     else:
-        asymmetry = jnp.full_like(radius, ROUGHENED_ASYMMETRY)
-    return extinction, absorption, asymmetry
+        fixed = RIMED_GEOMETRIC if optics.asymmetry == "rimed" else ROUGHENED_GEOMETRIC
+        asymmetry = jnp.full_like(radius, fixed)
+    share = diffracted_share(1 - absorption / extinction)
+    lobe = diffraction_asymmetry(radius_um, wavelength_um)
+    return _Seen(extinction, absorption, asymmetry, share, lobe)
 
 
 def _fitted_radii(optics: ClassOptics) -> tuple[float, float]:

@@ -17,8 +17,14 @@ much compact habits lack. Severely roughened aggregates of columns, the ice of M
 chosen for agreement of solar with infrared optical depths, have 0.75 in the visible at nearly any
 size (Yang et al. [1]_), `ROUGHENED_ASYMMETRY`. Between two sound answers on either side the default
 has stayed where it was; ``Hydrometeor(optics="rough")`` and ``--ice-optics rough`` take Baum's
-mixture, band by band and by size (`rough_ice`), and an `optics.ClassOptics` any number. Phase
-functions are Henyey and Greenstein's in any case: rough crystals have no halo.
+mixture, band by band and by size (`rough_ice`), and an `optics.ClassOptics` any number.
+
+*The phase function* has two lobes, of what is diffracted and of geometric optics (`diffraction`):
+rough crystals have no halo. Asymmetry factors, Fu's and Baum's, are each taken apart by the
+single-scattering albedo that belongs to it, which leaves 0.54 to 0.76 for geometric optics in all
+bands and sizes, and put together by the one that is used. A single lobe of the same asymmetry
+factor, as before, took diffracted light for scattered sideways, and needed more than 16 streams
+where crystals absorb: `benchmarks/truth.py`.
 
 References
 ----------
@@ -35,11 +41,14 @@ import math
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .diffraction import diffraction_asymmetry, geometric_asymmetry
 from .ice_tables import FU_RANGE_UM, Fu
 from .pointwise import choose
 
 # Asymmetry factor of severely roughened aggregates of columns, in the visible. [-]
 ROUGHENED_ASYMMETRY = 0.75
+# The same of what they do not diffract, half of it. [-]
+ROUGHENED_GEOMETRIC = 2 * ROUGHENED_ASYMMETRY - 1
 # Generalized effective size over mean photon path. [-] (Fu 1996: D = 2 IWC / (sqrt 3 rho A))
 SIZE_PER_PATH = 2 / math.sqrt(3)
 # Sizes within which the fit is bent towards its end. [um]
@@ -77,6 +86,24 @@ def ice_asymmetry(size_um: Float[Array, "*n"], fits: Fu) -> Float[Array, "*n"]:
         Those of the band, of `ice_tables.FU`.
     """
     return _cubic(fits.asymmetry, fitted_size(size_um))
+
+
+def ice_geometric_asymmetry(
+    size_um: Float[Array, "*n"], fits: Fu, wavelength_um: float | Float[Array, ""]
+) -> Float[Array, "*n"]:
+    """The same of what is not diffracted, by Fu's own single-scattering albedo. [-]
+
+    Parameters
+    ----------
+    size_um, fits
+        As in `ice_asymmetry`.
+    wavelength_um
+        Of the band. [um]
+    """
+    size = fitted_size(size_um)
+    diffracted = diffraction_asymmetry(size * (0.75 / SIZE_PER_PATH), wavelength_um)
+    ssa = 1 - _cubic(fits.coalbedo, size)
+    return geometric_asymmetry(_cubic(fits.asymmetry, size), ssa, diffracted)
 
 
 def ice_coalbedo(size_um: Float[Array, "*n"], fits: Fu) -> Float[Array, "*n"]:

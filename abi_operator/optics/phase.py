@@ -27,6 +27,16 @@ def _powers(x: Float[Array, "layer 1"], start: int, stop: int, step: int) -> Arr
     return product
 
 
+def _all_powers(g: Array, num_moments: int) -> Array:
+    if num_moments <= _BLOCK:
+        return _powers(g[:, None], 0, num_moments, 1)
+    # Long series are short ones times powers: one product a moment.
+    low, blocks = _powers(g[:, None], 0, _BLOCK, 1), -(-num_moments // _BLOCK)
+    high = _powers(g[:, None], 0, blocks * _BLOCK, _BLOCK)
+    moments = high[:, :, None] * low[:, None, :]
+    return moments.reshape(g.shape[0], -1)[:, :num_moments]
+
+
 @final
 class HenyeyGreenstein(PhaseFunction):
     r"""Phase function of Henyey and Greenstein (1941) [1]_.
@@ -48,14 +58,7 @@ class HenyeyGreenstein(PhaseFunction):
 
     def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
         r"""Legendre moments g\ :sup:`l`, as products: the derivative at g = 0 is exact."""
-        g = jnp.atleast_1d(self.asymmetry)
-        if num_moments <= _BLOCK:
-            return _powers(g[:, None], 0, num_moments, 1)
-        # Long series are short ones times powers: one product a moment.
-        low, blocks = _powers(g[:, None], 0, _BLOCK, 1), -(-num_moments // _BLOCK)
-        high = _powers(g[:, None], 0, blocks * _BLOCK, _BLOCK)
-        moments = high[:, :, None] * low[:, None, :]
-        return moments.reshape(g.shape[0], -1)[:, :num_moments]
+        return _all_powers(jnp.atleast_1d(self.asymmetry), num_moments)
 
     def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
         """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
@@ -64,9 +67,49 @@ class HenyeyGreenstein(PhaseFunction):
 
 @pointwise
 def _henyey_greenstein(g: Array, cos_scattering: Array) -> Array:
+    return _lobe(g, cos_scattering)
+
+
+def _lobe(g: Array, cos_scattering: Array) -> Array:
     # 1 + g^2 - 2 g cos, written so that float32 keeps its digits in a strong forward peak.
     distance = (1 - g) ** 2 + 2 * g * (1 - cos_scattering)
     return (1 - g) * (1 + g) / (distance * jnp.sqrt(distance))
+
+
+@final
+class TwoTermHenyeyGreenstein(PhaseFunction):
+    r"""Two lobes, each of Henyey and Greenstein.
+
+    .. math:: P = D\,P_{g_1} + (1 - D)\,P_{g_2}, \qquad \chi_l = D\,g_1^l + (1 - D)\,g_2^l
+
+    `hydrometeor` takes it for crystals: what is diffracted, and the rest (`diffraction`).
+
+    Parameters
+    ----------
+    first, second
+        Asymmetry factors of the lobes, of each layer; between -1 and 1. [-]
+    share
+        Share D of the first lobe, of each layer. [-]
+    """
+
+    first: Float[Array, " layer"]
+    second: Float[Array, " layer"]
+    share: Float[Array, " layer"]
+
+    def moments(self, num_moments: int) -> Float[Array, "layer moment"]:
+        """Legendre moments. [-]"""
+        one, other = (_all_powers(g, num_moments) for g in (self.first, self.second))
+        return self.share[:, None] * one + (1 - self.share)[:, None] * other
+
+    def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " layer"]:
+        """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
+        return _two_lobes(self.first, self.second, self.share, cos_scattering)
+
+
+@pointwise
+def _two_lobes(first: Array, second: Array, share: Array, cos_scattering: Array) -> Array:
+    one, other = (_lobe(g, cos_scattering) for g in (first, second))
+    return share * one + (1 - share) * other
 
 
 @final

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from abi_operator.bands import BANDS
-from abi_operator.optics.hydrometeor import CLASSES
+from abi_operator.optics.hydrometeor_classes import CLASSES, RIMED_GEOMETRIC
 from abi_operator.satellites import (
     SATELLITES,
     centroid_um,
@@ -33,7 +33,7 @@ def test_foam(band):
 @pytest.mark.parametrize("name", ["graupel", "hail"])
 def test_rimed_lumps(name):
     """An assumption: it is to move on purpose alone."""
-    assert CLASSES[name].asymmetry == 0.8
+    assert CLASSES[name].asymmetry == "rimed" and RIMED_GEOMETRIC == 0.6
 
 
 @pytest.mark.parametrize("band", KAPPA0)

@@ -17,7 +17,7 @@ from abi_operator.optics.gamma import (
     photon_path,
     sphere_habit,
 )
-from abi_operator.optics.hydrometeor import HABITS
+from abi_operator.optics.hydrometeor_classes import HABITS
 from abi_operator.optics.ice_tables import CRYSTALS, ICE_INDEX
 
 CLOSED_FORM = 1e-10

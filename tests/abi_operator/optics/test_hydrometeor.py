@@ -11,13 +11,12 @@ import pytest
 from abi_operator.atmosphere import Hydrometeor, LiquidCloud
 from abi_operator.bands import BANDS, Band, several_bands
 from abi_operator.microphysics import SCHEMES
-from abi_operator.optics import liquid_cloud
-from abi_operator.optics.hydrometeor import (
+from abi_operator.optics import (
     CLASSES,
     HABITS,
-    RIMED_ASYMMETRY,
     from_effective_radius,
     hydrometeor,
+    liquid_cloud,
     outside_fitted_range,
     particle_radius,
 )
@@ -102,7 +101,10 @@ def test_ice_against_fu(make_atmosphere):
     coalbedo = np.array([ice_coalbedo(size, FU[band]) for band in bands])
     asymmetry = [ice_asymmetry(size, FU[band]) for band in bands]
     np.testing.assert_allclose(mitchell[0], depth, rtol=0.055)
-    np.testing.assert_allclose(mitchell[2], asymmetry, rtol=1e-9)
+    # More is diffracted of what absorbs more: 0.0046 in C05, where Fu's interval does.
+    np.testing.assert_allclose(mitchell[2], asymmetry, rtol=0, atol=5e-3)
+    np.testing.assert_allclose(mitchell[2][:3], asymmetry[:3], rtol=0, atol=1e-4)
+    np.testing.assert_allclose(fu[2], asymmetry, rtol=1e-9)
     ratio = (np.asarray(mitchell[1]) / coalbedo)[1:]
     assert np.all(ratio > 0.6) and np.all(ratio < 1.3)
     np.testing.assert_allclose(fu[0], depth, rtol=1e-9)
@@ -116,7 +118,13 @@ def test_settings_of_a_class_are_used(make_atmosphere):
         classes = CLASSES | {"snow": CLASSES["snow"]._replace(**settings)}
         return hydrometeor(atmosphere, "snow", BANDS["C05"], classes)
 
-    assert optics(asymmetry="roughened").moments(2)[0, 1] == pytest.approx(0.75)
+    visible = {"asymmetry": "roughened"}
+    rough = hydrometeor(
+        atmosphere, "snow", BANDS["C01"], CLASSES | {"snow": CLASSES["snow"]._replace(**visible)}
+    )
+    # Less lambda / (pi^2 r) of the half that is diffracted.
+    lobe = BANDS["C01"].wavelength_um / (math.pi**2 * 80.0)
+    np.testing.assert_allclose(rough.moments(2)[0, 1], 0.75 - lobe / 2, rtol=0, atol=1e-6)
     assert optics(asymmetry=0.77).moments(2)[0, 1] == pytest.approx(0.77)
     plain = optics()
     reflecting = optics(internal_reflection=1.0)
@@ -140,7 +148,7 @@ def test_rimed_classes_scatter_by_a_given_asymmetry(make_atmosphere):
     for name, density in (("graupel", 400.0), ("hail", 900.0)):
         atmosphere = column(make_atmosphere, name, 1.0, 1e5)
         optics = hydrometeor(atmosphere, name, BANDS["C02"])
-        np.testing.assert_allclose(optics.moments(2)[0, 1], RIMED_ASYMMETRY, rtol=1e-14)
+        np.testing.assert_allclose(optics.moments(2)[0, 1], 0.8, rtol=0, atol=2e-4)
         # Spheres of the bulk density: Lam = (pi density N / m)^(1/3), A = N (pi / 2) / Lam^2.
         slope = (math.pi * density * 1e5) ** (1 / 3)
         np.testing.assert_allclose(optics.tau[0, 0], 2 * 1e5 * math.pi / 2 / slope**2, rtol=0.005)
