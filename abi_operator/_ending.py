@@ -17,7 +17,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
@@ -29,20 +29,29 @@ _WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "its termi
 # How long another thread may go on to write into what is to be removed. [s]
 _PATIENCE = 5.0
 
-_unfinished: set[Path] = set()
+_unfinished: dict[Path, Callable[[Path], str] | None] = {}
 _putting_in_place = Lock()
 _told = False
 _watching = False
 
 
 @contextmanager
-def unfinished(path: Path) -> Iterator[None]:
-    """A file or folder that is to be removed where the process ends in this block."""
-    _unfinished.add(path)
+def unfinished(path: Path, clear: Callable[[Path], str] | None = None) -> Iterator[None]:
+    """A file or folder that is to be removed where the process ends in this block.
+
+    Parameters
+    ----------
+    path
+        Which.
+    clear
+        Removes it, or all but what is to stay, of which it tells in words to end a sentence with;
+        `OSError` where it is to be called again.
+    """
+    _unfinished[path] = clear
     try:
         yield
     finally:
-        _unfinished.discard(path)
+        _unfinished.pop(path, None)
 
 
 @contextmanager
@@ -87,14 +96,18 @@ def _watch(outer: socket.socket, inner: socket.socket, numbers: dict[int, str]) 
 
 def _remove_unfinished() -> str:
     """Remove it, again where something was being written, and say so."""
-    paths, end = list(_unfinished), time.monotonic() + _PATIENCE
-    for path in paths:
+    paths, end, kept = dict(_unfinished), time.monotonic() + _PATIENCE, ""
+    for path, clear in paths.items():
         while os.path.lexists(path):
             with suppress(OSError):
-                path.unlink() if path.is_file() else shutil.rmtree(path)
+                if clear is not None and (stays := clear(path)):
+                    kept += stays
+                    break
+                if clear is None:
+                    path.unlink() if path.is_file() else shutil.rmtree(path)
             if time.monotonic() > end:
                 return f"; {path} could not be removed"
-    return "; what was unfinished has been removed" if paths else ""
+    return "; what was unfinished has been removed" + kept if paths else ""
 
 
 def _hear(number: int, frame: Any) -> None:

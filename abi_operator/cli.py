@@ -13,6 +13,7 @@ threads, and so do the retrievals. More CPU devices of JAX would do nothing for 
 import gc
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Annotated, Any
@@ -65,7 +66,7 @@ def demo(
     """
     with one_sentence(), user_warnings():
         before = pictures_of_before(out)
-        with output_folder(out, outdated=before) as folder:
+        with output_folder(out, outdated=partial(pictures_of_before, out)) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
             # As in the paper, which neglects absorption by gases. Nothing is left out, since the
             # retrieval is to find the very optical depths that made the image.

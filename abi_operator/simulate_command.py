@@ -3,6 +3,7 @@
 Inputs are opened and checked before a folder is made.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -287,7 +288,8 @@ def simulate(
     with one_sentence(), user_warnings():
         scene = open_scene(request)
         before = pictures_of_before(out)
-        with output_folder(out, outdated=before) as folder:
+        outdated = partial(pictures_of_before, out)
+        with output_folder(out, outdated=outdated, keeps_parts=True) as folder:
             report = simulate_scene(scene, folder)
         print_report(report, out, before)
 

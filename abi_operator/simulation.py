@@ -14,6 +14,7 @@ import xarray as xr
 from .drawing import Painter
 from .files import (
     InputError,
+    Parts,
     ResultWriter,
     WrfSeries,
     check_variables,
@@ -195,7 +196,11 @@ class Report(NamedTuple):
 
 
 def simulate_scene(scene: Scene, folder: Path) -> Report:
-    """Write the result and a picture of every time."""
+    """Write the result and a picture of every time.
+
+    What an earlier run has kept of the same scene in the folder, `output_folder` having found it
+    there, is not computed again.
+    """
     request = scene.request
     specify = partial(
         scenario,
@@ -229,6 +234,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
     painter = Painter(
         folder, scene.times, scene.shape[0], rayleigh_correction=request.rayleigh_correction
     )
+    parts = Parts(folder)
     with ResultWriter(
         folder / RESULT,
         times=scene.times,
@@ -250,6 +256,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
             num_streams=request.num_streams,
             error_budget=request.error_budget,
             block_columns=_BLOCK_COLUMNS,
+            parts=parts,
         )
         wrf = dict.fromkeys(scene.series.places[time][0].name for time in scene.chosen_times)
         account["wrf_file"] = "; ".join(wrf)
@@ -258,6 +265,8 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         writer.add_attributes(account)
     with read_result(folder / RESULT) as result:
         lines = [*flag_lines(result), *plume_lines(scene.plumes), *account_lines(account)]
+    if parts.num_found:
+        lines.append(f"simulated before, by a run that had ended early: {parts.num_found} blocks")
     note_files(folder / RESULT, painter.names)
     return Report([RESULT, *painter.names], lines)
 

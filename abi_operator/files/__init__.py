@@ -14,6 +14,7 @@ from .fires import read_fires as read_fires
 from .mcd43 import read_mcd43a1 as read_mcd43a1
 from .mcd43 import read_white_sky as read_white_sky
 from .netcdf import reading as reading
+from .parts import Parts as Parts
 from .plume import read_plume as read_plume
 from .projection import projected as projected
 from .result import ResultWriter as ResultWriter

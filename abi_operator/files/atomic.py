@@ -4,13 +4,13 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 
 from .._ending import undisturbed, unfinished
-from .abandoned import MARK, marked, remove_abandoned
+from .abandoned import MARK, PARTS, alone, num_parts, own_folder, remove
 from .errors import InputError
 
 # What says that nothing more can be written; the NetCDF library names no such reason.
@@ -19,13 +19,20 @@ _NETCDF = "NetCDF: "
 
 
 @contextmanager
-def output_folder(path: str | PathLike[str], *, outdated: Iterable[str] = ()) -> Iterator[Path]:
+def output_folder(
+    path: str | PathLike[str],
+    *,
+    outdated: Callable[[], Iterable[str]] = tuple,
+    keeps_parts: bool = False,
+) -> Iterator[Path]:
     """Yield a temporary folder, the files of which move into `path` when the block succeeds.
 
     The temporary folder lies beside `path` (in it where there is no place beside it), on the same
-    file system, so that moving is renaming.
+    file system, so that moving is renaming; of several runs one moves after the other.
     Whatever ends the block early, a keyboard interrupt too, deletes it and leaves `path` as it was.
-    What a process that was killed has left there, the next one that writes to `path` deletes.
+    What a process that was killed has left there, the next one that writes to `path` deletes; where
+    it was killed as files moved, some of them have moved, and the next one replaces them.
+    Of a block that keeps `Parts` these stay where it ends early, until it ends well.
 
     Parameters
     ----------
@@ -33,7 +40,10 @@ def output_folder(path: str | PathLike[str], *, outdated: Iterable[str] = ()) ->
         Folder for the output, made with its parents if need be; files of the same name in it are
         replaced, others stay.
     outdated
-        Names of files in `path` that go where they are not replaced.
+        Gives names of files in `path` that go where they are not replaced, when all is ready to be
+        moved: another run may just have put them there.
+    keeps_parts
+        Whether the block keeps `Parts` in the folder.
 
     Raises
     ------
@@ -46,26 +56,54 @@ def output_folder(path: str | PathLike[str], *, outdated: Iterable[str] = ()) ->
         raise InputError(f"{existing} is a file where a folder is needed; give another folder.")
     inside = os.path.ismount(target) or not os.access(target.parent, os.W_OK)
     beside = existing if existing != target or inside else target.parent
-    remove_abandoned(target.name, (beside, target, target.parent))
-    try:
-        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=beside))
-    except OSError as error:
-        raise InputError(
-            f"{beside} cannot be written to ({error.strerror}); give another folder."
-        ) from error
-    with unfinished(temporary):
+    places = {beside, *(place for place in (target, target.parent) if place.is_dir())}
+    with ExitStack() as stack:
+        with _writable(existing):
+            own = own_folder(target.name, beside, places, keeps_parts=keeps_parts)
+            temporary = stack.enter_context(own)
+        stack.enter_context(unfinished(temporary, _clear))
+        whole = False
         try:
-            with marked(temporary):
-                yield temporary
-                with undisturbed():
-                    _move_files(temporary, target, outdated)
+            yield temporary
+            with undisturbed(), _writable(target):
+                _put_in_place(temporary, target, outdated)
+            whole = True
+        except InputError as error:
+            if not num_parts(temporary):
+                raise
+            raise InputError(f"{str(error).rstrip('.')}{_kept(temporary)}.") from error
         except (OSError, RuntimeError) as error:
             reason = _no_room(error)
             if reason is None:
                 raise
             raise InputError(_full(target, temporary, reason)) from error
         finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+            with suppress(OSError):
+                remove(temporary, but_parts=not whole)
+
+
+def _clear(folder: Path) -> str:
+    """Remove all but parts, and say where these are."""
+    remove(folder, but_parts=True)
+    return _kept(folder)
+
+
+def _kept(folder: Path) -> str:
+    kept = num_parts(folder)
+    return f"; what was simulated is kept in {folder}, and the same command goes on" if kept else ""
+
+
+@contextmanager
+def _writable(folder: Path) -> Iterator[None]:
+    """Say so where a folder, or what is to be made in it, cannot be written."""
+    try:
+        if folder.is_dir():
+            tempfile.TemporaryFile(dir=folder).close()
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written to ({error.strerror}); give another folder."
+        ) from error
 
 
 def _no_room(error: OSError | RuntimeError) -> str | None:
@@ -81,25 +119,33 @@ def _full(target: Path, temporary: Path, reason: str) -> str:
     free = shutil.disk_usage(temporary).free / 1e6
     return (
         f"the output for {target} cannot be written ({reason}) after {written:.1f} MB, with "
-        f"{free:.1f} MB free there; make room, or give a folder on another disk."
+        f"{free:.1f} MB free there; make room, or give a folder on another disk{_kept(temporary)}."
     )
 
 
-def _move_files(source: Path, target: Path, outdated: Iterable[str]) -> None:
-    """Move every file below `source` to the same place below `target`, and remove the outdated."""
+def _put_in_place(source: Path, target: Path, outdated: Callable[[], Iterable[str]]) -> None:
+    """Move every file below `source` to the same place below `target`, and remove the outdated.
+
+    The last file comes last of all: it is the result, which tells what else there is.
+    """
     files = sorted(file.relative_to(source) for file in source.rglob("*") if file.is_file())
-    files = [file for file in files if file.name != MARK]
-    for file in files:
-        if (target / file).is_dir():
-            raise InputError(f"{target / file} is a folder where a file is to be; move it away.")
-    try:
+    files = [file for file in files if file.parts[0] not in (MARK, PARTS)]
+    target.mkdir(parents=True, exist_ok=True)
+    with alone(target):
         for file in files:
-            (target / file).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(source / file, target / file)
-        target.mkdir(parents=True, exist_ok=True)
-        for name in set(outdated) - {str(file) for file in files}:
+            if (target / file).is_dir():
+                raise InputError(
+                    f"{target / file} is a folder where a file is to be; move it away."
+                )
+        gone = set(outdated()) - {str(file) for file in files}
+        for file in files[:-1]:
+            _move(source, target, file)
+        for name in gone:
             (target / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{target} cannot be written to ({error.strerror}); give another folder."
-        ) from error
+        for file in files[-1:]:
+            _move(source, target, file)
+
+
+def _move(source: Path, target: Path, file: Path) -> None:
+    (target / file).parent.mkdir(parents=True, exist_ok=True)
+    os.replace(source / file, target / file)

@@ -144,6 +144,19 @@ def _read(path: Path) -> Callable[..., Any] | None:
     return partial(_call, program, tree)
 
 
+def state_of_code() -> str | None:
+    """Digest of this package's files, versions and the processor, on which numbers depend.
+
+    None where files have changed since this process began, so that they do not tell what runs.
+    """
+    try:
+        digest = hashlib.sha256(_digest(__name__.partition(".")[0]))
+    except (ValueError, OSError):
+        return None
+    digest.update(f"{_environment()} {os.environ.get('XLA_FLAGS', '')}".encode())
+    return digest.hexdigest()
+
+
 @cache
 def _find_lapack() -> None:
     """JAX looks for LAPACK where it lowers a call of it; a program read from a file needs it, too.

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
+from ..files import Parts
 from ..radiance import THERMAL
 from .account import Attribute, add_accounts
 from .progress import Progress
@@ -38,6 +39,7 @@ def run(
     error_budget: float | None = ERROR_BUDGET,
     block_columns: int = 16384,
     progress: bool = True,
+    parts: Parts | None = None,
 ) -> dict[str, Attribute]:
     """Simulate all times of a scene with one block of rows in memory.
 
@@ -57,6 +59,9 @@ def run(
         Atmospheric columns in memory at a time. [-]
     progress
         Whether to show how many columns are done, where a terminal looks on.
+    parts
+        Where blocks that are solved are kept, and found where an earlier run has solved them. None
+        are of a scene of one block.
 
     Returns
     -------
@@ -64,15 +69,22 @@ def run(
     """
     account: dict[str, Attribute] = {}
     total = len(times) * shape[0] * shape[1]
+    blocks = row_blocks(shape, block_columns)
+    if len(times) * len(blocks) == 1:
+        parts = None
     with Progress(total, show=progress) as bar:
         for time_index in range(len(times)):
-            for rows in row_blocks(shape, block_columns):
+            for rows in blocks:
                 block = read_block(time_index, rows)
                 thermal = np.isin(block["band"].values, list(THERMAL))
                 programs = int(thermal.sum()) + bool((~thermal).any())
                 bar.begin(block.sizes["y"] * block.sizes["x"], programs)
                 result = simulate(
-                    block, num_streams=num_streams, error_budget=error_budget, listener=bar
+                    block,
+                    num_streams=num_streams,
+                    error_budget=error_budget,
+                    listener=bar,
+                    parts=parts,
                 )
                 write_block(time_index, rows, result)
                 account = add_accounts([account, result.attrs])

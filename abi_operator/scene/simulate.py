@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..atmosphere import Atmosphere, State
 from ..bands import BANDS, check_bands
-from ..files import InputError
+from ..files import InputError, Parts
 from ..files.netcdf import cf_attributes
 from ..machine.chunks import map_chunks
 from ..machine.listening import Listener, listening
@@ -25,6 +25,7 @@ from .columns import column_states, horizontal
 from .gases import check_gases, gases_attribute, gases_of
 from .kinds_of_ground import ground_flags
 from .light import Unheard, light
+from .parts import solved_or_found
 from .sun import sun_path_of
 
 ERROR_BUDGET = 1e-3
@@ -40,6 +41,7 @@ def simulate(
     num_streams: int = 8,
     error_budget: float | None = ERROR_BUDGET,
     listener: Listener | None = None,
+    parts: Parts | None = None,
 ) -> xr.Dataset:
     r"""Simulate the radiances and reflectances of a scenario.
 
@@ -64,6 +66,8 @@ def simulate(
     listener
         Is told of columns as they are solved: all that can be in the bands without emission, then
         all that can be in each of the others.
+    parts
+        Where to find what an earlier run of the same has solved, and to keep what this one has.
 
     Returns
     -------
@@ -87,14 +91,22 @@ def simulate(
     if gases and "vapour" not in scenario:
         raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
     states = column_states(scenario, bands, num_streams=num_streams)
-    with listening(None if listener is None else Unheard(listener)):
-        fields = _optical_depths(states.atmosphere, bands)
-    flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
-    flags = flags | _flags(states, fields["outside_fitted_range"])
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
     distance = sun_distance(scenario["time"].values) if "time" in scenario.variables else 1.0
     settings = {"gases": gases, "num_streams": num_streams, "error_budget": error_budget}
-    fields |= light(states, flags, bands, satellite, distance, settings, listener)
+
+    def flags_with(depths: dict[str, np.ndarray]) -> np.ndarray:
+        flags = scenario["quality_flag"].values.astype(np.uint8).reshape(-1)
+        return flags | _flags(states, depths["outside_fitted_range"])
+
+    def solve() -> dict[str, np.ndarray]:
+        with listening(None if listener is None else Unheard(listener)):
+            depths = _optical_depths(states.atmosphere, bands)
+        flags = flags_with(depths)
+        return depths | light(states, flags, bands, satellite, distance, settings, listener)
+
+    fields = solved_or_found(parts, scenario, {"bands": bands, **settings}, solve)
+    flags = flags_with(fields)
     shape = horizontal(scenario)
     result = scenario.sel(band=list(bands))
     for name, values in fields.items():

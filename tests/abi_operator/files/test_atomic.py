@@ -1,13 +1,19 @@
 """Output that is there whole or not at all."""
 
 import errno
+import json
 import os
 import re
+import subprocess
+import sys
 import tempfile
+import threading
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from abi_operator.files import InputError, output_folder
+from abi_operator.files import InputError, Parts, output_folder
 from abi_operator.files.abandoned import MARK
 
 
@@ -82,8 +88,8 @@ def test_a_relative_path_means_where_we_were(tmp_path, monkeypatch):
 def test_only_folders_that_runs_have_left_are_removed(tmp_path):
     """Neither those of a run that is alive nor what only looks like one."""
     (tmp_path / ".out-notes").mkdir()
-    (tmp_path / ".out-of-a-dead-run").mkdir()
-    (tmp_path / ".out-of-a-dead-run" / MARK).touch()
+    (tmp_path / ".out-deadruns").mkdir()
+    (tmp_path / ".out-deadruns" / MARK).touch()
     with output_folder(tmp_path / "out") as alive, output_folder(tmp_path / "out") as other:
         (alive / "a").write_text("whole")
         (other / "b").write_text("whole")
@@ -114,9 +120,103 @@ def test_outdated_files_go_when_new_ones_come(tmp_path):
     target.mkdir()
     for name in ("a", "b", "c"):
         (target / name).write_text("old")
-    with pytest.raises(ValueError), output_folder(target, outdated=["a", "b"]):
+    with pytest.raises(ValueError), output_folder(target, outdated=lambda: ["a", "b"]):
         raise ValueError
     assert len(list(target.iterdir())) == 3
-    with output_folder(target, outdated=["a", "b"]) as folder:
+    with output_folder(target, outdated=lambda: ["a", "b"]) as folder:
         (folder / "a").write_text("new")
     assert {f.name: f.read_text() for f in target.iterdir()} == {"a": "new", "c": "old"}
+
+
+def keep(folder, name):
+    Parts(folder).keep(name, {"values": np.arange(3.0)})
+
+
+def test_parts_of_a_run_that_ended_early_are_found_by_the_next_that_keeps_some(tmp_path):
+    """And by no other, and not of a folder whose name only begins alike."""
+    with pytest.raises(InputError, match=r"^a hole; what was simulated is kept in .*goes on\.$"):
+        with output_folder(tmp_path / "out", keeps_parts=True) as folder:
+            keep(folder, "one")
+            (folder / "result.nc").write_text("half")
+            raise InputError("a hole.")
+    for name, keeps_parts in (("out", False), ("out-2", True)):
+        with output_folder(tmp_path / name, keeps_parts=keeps_parts) as other:
+            assert Parts(other).find("one") is None
+    assert sorted(x.name for x in folder.iterdir()) == [".abi-operator-parts", MARK]
+    with output_folder(tmp_path / "out", keeps_parts=True) as again:
+        parts = Parts(again)
+        np.testing.assert_array_equal(parts.find("one")["values"], np.arange(3.0))
+        assert again == folder and parts.find("two") is None and parts.num_found == 1
+    assert sorted(x.name for x in tmp_path.iterdir()) == ["out", "out-2"]
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_damaged_part_is_none(tmp_path):
+    with output_folder(tmp_path / "out", keeps_parts=True) as folder:
+        keep(folder, "one")
+        (path,) = folder.glob("*/one.npz")
+        whole = path.read_bytes()
+        for damaged in (b"", whole[:-9], whole[:150] + b"x" + whole[151:]):
+            path.write_bytes(damaged)
+            assert Parts(folder).find("one") is None
+
+
+def test_of_two_runs_with_parts_each_has_its_own(tmp_path):
+    with output_folder(tmp_path / "out", keeps_parts=True) as one:
+        keep(one, "one")
+        with output_folder(tmp_path / "out", keeps_parts=True) as other:
+            assert other != one and Parts(other).find("one") is None
+
+
+def test_of_two_runs_one_moves_after_the_other(tmp_path, monkeypatch):
+    """And removes the pictures that the other has just put there."""
+    target, moved, replace = tmp_path / "out", threading.Event(), os.replace
+
+    def slowly(source, name):
+        replace(source, name)
+        moved.set()
+        threading.Event().wait(0.1)
+
+    def write(words):
+        outdated = lambda: [x.name for x in target.glob("*.png")]  # noqa: E731
+        with output_folder(target, outdated=outdated) as folder:
+            for name in (f"{words}.png", "result.nc"):
+                (folder / name).write_text(words)
+            if words == "second":
+                moved.wait(10)
+
+    monkeypatch.setattr(os, "replace", slowly)
+    second = threading.Thread(target=write, args=("second",))
+    second.start()
+    write("first")
+    second.join()
+    found = {x.name: x.read_text() for x in target.iterdir()}
+    assert found == {"second.png": "second", "result.nc": "second"}
+
+
+def test_a_folder_that_cannot_be_written_is_named_before_anything_is_computed(
+    tmp_path, monkeypatch
+):
+    target = tmp_path / "out"
+    target.mkdir()
+
+    def refuse(dir):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)  # root may write everywhere
+    with pytest.raises(InputError, match=r"out cannot be written to \(Read-only file system\)"):
+        with output_folder(target):
+            raise AssertionError
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_writer_that_is_killed_at_any_step_leaves_what_another_one_mends(tmp_path):
+    root = Path(__file__).parents[3]
+    script = root / "benchmarks" / "long_runs_steps.py"
+    path = os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-P", str(script), str(tmp_path)]
+    environment = os.environ | {"PYTHONPATH": path}
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert ended.returncode == 0, ended.stderr
+    tried, wrong = json.loads(ended.stdout)
+    assert tried > 20 and not wrong

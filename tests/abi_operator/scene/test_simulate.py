@@ -1,13 +1,15 @@
 """Simulated scenes: what they contain, where they are undefined, and how they are cut."""
 
+import importlib
 import io
 import sys
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from abi_operator import brf, quality_flags, radiance, smoke
-from abi_operator.files import InputError
+from abi_operator.files import InputError, Parts
 from abi_operator.nomenclature import (
     LARGEST_SHARE_OUTSIDE,
     OPTIONAL_RESULT,
@@ -24,6 +26,7 @@ from abi_operator.scene import (
     simulate,
 )
 from abi_operator.scene.angles import sun_distance
+from abi_operator.scene.parts import part_name
 
 BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
 OPTIONS = {"num_streams": 2, "error_budget": None}
@@ -219,6 +222,42 @@ def test_a_run_goes_through_all_times_and_rows(made):
         assert result["time"] == times[time_index]
         part = whole.isel(y=slice(start, start + 2))
         np.testing.assert_allclose(result["brf"], part["brf"], rtol=ROUNDING)
+
+
+def test_a_run_goes_on_where_one_has_ended_early(made, tmp_path, monkeypatch):
+    """The same numbers, of nothing that is solved again; other columns or settings are."""
+    times = made["time"].values + np.arange(2) * np.timedelta64(15, "m")
+
+    def simulated(parts, albedo=0.0):
+        found = {}
+        run(
+            lambda time, rows: (
+                made.assign(surface_albedo=made["surface_albedo"] + albedo * time)
+                .isel(y=rows)
+                .assign_coords(time=times[time])
+            ),
+            times,
+            (3, 2),
+            lambda time, rows, result: found.update({(time, rows.start): result}),
+            block_columns=4,
+            progress=False,
+            parts=parts,
+            **OPTIONS,
+        )
+        return found
+
+    known = simulated(Parts(tmp_path))
+    again = Parts(tmp_path)
+    solve = importlib.import_module("abi_operator.scene.simulate")
+    light, solved = solve.light, []
+    monkeypatch.setattr(solve, "light", lambda *x: solved.append(1) or light(*x))
+    for place, result in simulated(again).items():
+        xr.testing.assert_identical(result, known[place])
+    assert again.num_found == 4 and not solved
+    simulated(again, albedo=1e-15)  # the second time is another
+    assert (again.num_found, len(solved)) == (6, 2)
+    names = {part_name(x, {"num_streams": n}) for x in (made, made.isel(y=[0])) for n in (2, 4)}
+    assert len(names | {part_name(made.assign_attrs(sun_path="flat"), {"num_streams": 2})}) == 5
 
 
 def test_a_listener_hears_of_columns_as_they_are_solved(made):
