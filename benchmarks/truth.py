@@ -12,7 +12,8 @@ whole phase function. "Before" is the same with `--cloud-optics mitchell`, again
 Errors are relative, in C01-C06 to no less than what a ground of albedo `FLOOR` would send up. Per
 cent: median, 99th percentile, largest. `--check` exits with 1 where the goals are missed: 99 of 100
 within 0.5 %, of columns with ice within 1 %. `--truth-error` says how good the truth is itself, on
-columns of its own: against fewer streams and more azimuth modes.
+columns of its own: against fewer streams and more azimuth modes. The last table has the errors of
+other numbers of streams (`--streams`), with processor seconds of all columns and bands.
 """
 
 import argparse
@@ -89,6 +90,20 @@ def truth_error(options):
         report(f"The truth beside {name}, {len(kinds)} columns", error, kinds)
 
 
+def by_streams(states, kinds, truth, numbers):
+    """Errors of columns without and with ice by streams, and what they cost."""
+    icy, rows = np.isin(kinds, ICY), []
+    for number in numbers:
+        solved(jax.tree.map(lambda x: x[:BLOCK], states), num_streams=number)  # compiled apart
+        start = time.process_time()
+        error = relative_error(solved(states, num_streams=number), truth, states)
+        seconds = time.process_time() - start
+        rows.append([str(number), cell(error[~icy].ravel()), cell(error[icy].ravel())])
+        rows[-1].append(f"{seconds:.1f}")
+    print("Errors by streams; median, 99th percentile, largest in per cent:\n")
+    table(["streams", "without ice", "with ice", "processor time [s]"], rows)
+
+
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -96,6 +111,7 @@ def main():
     parser.add_argument("--columns", type=int, default=1000)
     parser.add_argument("--truth-streams", type=int, default=64)
     parser.add_argument("--truth-modes", type=int, default=32)
+    parser.add_argument("--streams", type=int, nargs="*", default=[8, 10, 12, 16])
     parser.add_argument("--truth-error", type=int, metavar="COLUMNS", default=0)
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
@@ -125,6 +141,7 @@ def main():
             ):
                 p99 = np.percentile(error[of], 99)
                 bars.judge(p99 <= goal, f"{name}: p99 {100 * p99:.2g} %, goal {100 * goal:g} %")
+    by_streams(states, kinds, truth, options.streams)
     print(f"{time.perf_counter() - started:.0f} s\n")
     bars.report()
     sys.exit(1 if options.check and bars.failed else 0)
