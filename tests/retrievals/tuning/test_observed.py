@@ -1,0 +1,182 @@
+"""Observations of every layout land on the scene's grid, or are refused with a reason."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from abi_operator.files import InputError
+from abi_operator.files.result import ResultWriter
+from retrievals.tuning import read_observed
+from retrievals.tuning.fixed_grid import nearest_on_axis, scan_angles
+from retrievals.tuning.observed import bands_in_common
+from retrievals.tuning.placing import spacing_km
+
+# Of GOES-16, as its files have it.
+PROJECTION = {
+    "semi_major_axis": 6378137.0,
+    "semi_minor_axis": 6356752.31414,
+    "perspective_point_height": 35786023.0,
+    "longitude_of_projection_origin": -75.0,
+    "sweep_angle_axis": "x",
+}
+
+
+def named(image, name="C0{}", scale=1.0, units="1", **changes):
+    """A file's content: variables of C01 to C03 and where they are."""
+    values = image["reflectance_factor"].values
+    variables = {
+        name.format(k): (("lat", "lon"), scale * values[k - 1], {"units": units}) for k in (1, 2, 3)
+    }
+    places = {x: (("lat", "lon"), image[x].values) for x in ("latitude", "longitude")}
+    return xr.Dataset(variables | places | changes)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(dataset, name="observed.nc"):
+        dataset.to_netcdf(tmp_path / name)
+        return [tmp_path / name]
+
+    return write
+
+
+def test_named_variables_lie_on_the_same_grid(image, write):
+    seen = read_observed(write(named(image)), image)
+    assert (
+        seen.attrs["regridding"] == "none" and seen.attrs["observed_variables"] == "C01, C02, C03"
+    )
+    np.testing.assert_array_equal(seen["reflectance_factor"], image["reflectance_factor"])
+    assert list(bands_in_common(image, seen)) == ["C01", "C02", "C03"]
+
+
+def test_a_result_with_several_times_is_taken_at_the_scenes(image, tmp_path):
+    time = image["time"].values
+    dark = image.assign(reflectance_factor=0 * image["reflectance_factor"])
+    times = np.array([time - np.timedelta64(1, "h"), time])
+    with ResultWriter(tmp_path / "result.nc", times=times, shape=(3, 8)) as writer:
+        for k, block in enumerate((dark, image)):
+            writer.write(k, slice(0, 3), block.drop_vars("time"))
+    seen = read_observed([tmp_path / "result.nc"], image)
+    np.testing.assert_allclose(seen["reflectance_factor"], image["reflectance_factor"])
+    with pytest.raises(InputError, match="30 minutes apart"):
+        read_observed(
+            [tmp_path / "result.nc"], image.assign_coords(time=time + np.timedelta64(2, "h"))
+        )
+
+
+def test_a_division_by_the_cosine_of_the_sun_is_undone(image, write):
+    mu0 = np.cos(np.radians(48.0))
+    for name, quantity in (("brf_C0{}", "reflectance_factor"), ("C0{}", "brf")):
+        seen = read_observed(write(named(image, name, 1 / mu0)), image, quantity=quantity)
+        np.testing.assert_allclose(seen["reflectance_factor"], image["reflectance_factor"])
+
+
+def test_bands_of_modis_stand_for_abis(image, write):
+    seen = read_observed(write(named(image, "Band{}")), image)
+    assert list(seen["band"].values) == ["C01", "C02", "C03"]
+    own = image["reflectance_factor"].values
+    # Band 1 is red, 2 near infrared and 3 blue; what is of no such band is missing.
+    np.testing.assert_array_equal(seen["reflectance_factor"], own[[2, 0, 1]])
+    assert "Band3 of MODIS" in seen.attrs["observed_variables"]
+
+
+def test_missing_values_are_missing_pixel_by_pixel(image, write):
+    file = named(image)
+    file["C02"][1, 2] = np.nan
+    lost = np.isnan(read_observed(write(file), image)["reflectance_factor"].values)
+    assert lost.sum() == 1 and lost[1, 1, 2]
+
+
+def test_the_nearest_pixel_is_taken_where_that_is_asked_for(image, write):
+    moved = named(image)
+    moved["latitude"] = moved["latitude"] + 0.01  # 1.1 km
+    with pytest.raises(InputError, match=r"1.11 km away .* which are 4.\d* km apart; regrid it"):
+        read_observed(write(moved), image)
+    seen = read_observed(write(moved), image, nearest_km=2.0)
+    np.testing.assert_array_equal(seen["reflectance_factor"], image["reflectance_factor"])
+    assert seen.attrs["regridding"] == "nearest pixel within 2 km"
+    # Of a file of half the rows, the others have none.
+    half = moved.isel(lat=slice(0, 1))
+    seen = read_observed(write(half), image, nearest_km=2.0)["reflectance_factor"]
+    assert np.isfinite(seen.values).all(axis=(0, 2)).tolist() == [True, False, False]
+    with pytest.raises(InputError, match="no pixel of .* is within 1 km"):
+        read_observed(write(moved), image, nearest_km=1.0)
+
+
+def abi_file(image, band, values):
+    """An L1b file around the scene, packed as ABI's are, on a grid finer than the scene's."""
+    x, y = scan_angles(image["latitude"].values, image["longitude"].values, PROJECTION)
+    step = 28e-6
+    columns = np.arange(np.nanmin(x) - 5 * step, np.nanmax(x) + 5 * step, step)
+    rows = np.arange(np.nanmax(y) + 5 * step, np.nanmin(y) - 5 * step, -step)
+    r, c = nearest_on_axis(rows, y), nearest_on_axis(columns, x)
+    distance, esun = 0.995, 2017.18
+    radiance = np.zeros((rows.size, columns.size))
+    radiance[r, c] = values * esun / (np.pi * distance**2)
+    quality = np.zeros(radiance.shape, np.int8)
+    quality[r[0, 0], c[0, 0]] = 3
+    return xr.Dataset(
+        {
+            "Rad": (("y", "x"), radiance, {"units": "W m-2 sr-1 um-1"}),
+            "DQF": (("y", "x"), quality),
+            "esun": ((), esun),
+            "earth_sun_distance_anomaly_in_AU": ((), distance),
+            "band_id": (("band",), [int(band[1:])]),
+            "goes_imager_projection": ((), 0, PROJECTION),
+        },
+        {"y": rows, "x": columns},
+        {"time_coverage_start": "2007-10-23T18:01:17.2Z"},
+    )
+
+
+def test_a_place_has_the_pixel_of_an_abi_file_that_it_is_seen_in(image, write):
+    own = image["reflectance_factor"]
+    files = [
+        *write(abi_file(image, "C02", own.sel(band="C02").values), "C02.nc"),
+        *write(abi_file(image, "C01", own.sel(band="C01").values), "C01.nc"),
+    ]
+    seen = read_observed(files, image)
+    assert list(seen["band"].values) == ["C01", "C02"]
+    difference = np.abs(seen["reflectance_factor"].values - own.sel(band=["C01", "C02"]).values)
+    assert np.isnan(difference[:, 0, 0]).all()  # of quality "no value"
+    assert np.nanmax(difference) < 1e-12
+    assert seen.attrs["observed_time"] == "2007-10-23T18:01:17"
+
+
+def test_scan_angles_are_those_of_the_users_guide():
+    """The example of its section 5.1.2.8.2, and a place that is out of sight."""
+    projection = PROJECTION | {"semi_minor_axis": 6356752.31414}
+    x, y = scan_angles(np.array([33.846162, 0.0]), np.array([-84.690932, 100.0]), projection)
+    np.testing.assert_allclose([x[0], y[0]], [-0.024052, 0.095340], atol=1e-6)
+    assert np.isnan(x[1]) and np.isnan(y[1])
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (dict(units="%"), "has the units '%' where '1' is expected|units '%'"),
+        (dict(scale=100.0), "it seems to be in per cent"),
+        (dict(name="radiance{}"), "has no reflectances"),
+        (dict(scale=np.nan), "has no finite value"),
+    ],
+)
+def test_what_is_no_reflectance_is_refused(image, write, change, sentence):
+    with pytest.raises(InputError, match=sentence):
+        read_observed(write(named(image, **change)), image)
+
+
+def test_a_file_without_places_and_bands_twice_are_refused(image, write):
+    paths = write(named(image).drop_vars(["latitude", "longitude"]), "a.nc")
+    with pytest.raises(InputError, match="cannot be laid on the scene"):
+        read_observed(paths, image)
+    paths = [*write(named(image), "b.nc"), *write(named(image), "c.nc")]
+    with pytest.raises(InputError, match="C01, C02, C03 was observed by more than one"):
+        read_observed(paths, image)
+    with pytest.raises(InputError, match="C06 is not in both"):
+        bands_in_common(image, read_observed(paths[:1], image), ["C06"])
+
+
+def test_neighbours_are_as_far_apart_as_the_sphere_has_it(image):
+    expected = np.radians(0.043) * np.cos(np.radians(33.036)) * 6371
+    own = image["latitude"].values, image["longitude"].values
+    assert abs(spacing_km(*own) / expected - 1) < 1e-6
