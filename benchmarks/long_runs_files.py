@@ -6,6 +6,7 @@ entry points give it, whether or not it is installed: `retrieve` and `score` are
 
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -38,7 +39,7 @@ _STAMP = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ")
 
 
 class Ended(NamedTuple):
-    """How a command ended: exit status, what it said, and after how long. [s]"""
+    """How a command ended: exit status, what it said, and its time on processors. [s]"""
 
     status: int
     said: str
@@ -78,15 +79,27 @@ def start(arguments, cache, folder, **keywords):
 
 
 def run(arguments, cache, folder, killed_after=None, **keywords):
-    """Run a command to its end, or kill it so many seconds after its start."""
-    began = time.monotonic()
+    """Run a command to its end, or kill it when it has had so many seconds of a processor."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with start(arguments, cache, folder, **keywords) as process:
-        try:
-            said, _ = process.communicate(timeout=killed_after)
-        except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGKILL)
-            said, _ = process.communicate()
-    return Ended(process.returncode, said, time.monotonic() - began)
+        while killed_after is not None and process.poll() is None:
+            if _processor_time(process.pid) > killed_after:
+                process.send_signal(signal.SIGKILL)
+                break
+            time.sleep(0.002)
+        said, _ = process.communicate()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return Ended(process.returncode, said, seconds)
+
+
+def _processor_time(process):
+    """What a process has had of processors. [s]"""
+    try:
+        words = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:  # it has ended
+        return 0.0
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def differences(folder, other):

@@ -10,7 +10,13 @@ import xarray as xr
 
 from abi_operator.bands import check_bands
 from abi_operator.commands import one_sentence, typed
-from abi_operator.files import InputError, output_folder, read_result, reading
+from abi_operator.files import (
+    InputError,
+    check_output_folder,
+    output_folder,
+    read_result,
+    reading,
+)
 from abi_operator.radiance import FIRE_BANDS
 
 from .fires import BACKGROUNDS
@@ -110,6 +116,7 @@ def retrieve(
     how |= {} if where is None else {"where": where}
     how |= {} if smooth is None else {"smooth": smooth}
     with one_sentence(), reading(str(result)), read_result(result) as dataset:
+        check_output_folder(out.absolute().parent)
         retrieval = retrieve_kind(
             dataset,
             kind,

@@ -56,8 +56,10 @@ def result_codes(
     alone = np.all(best.prior_cost == 0)
     freedom = np.broadcast_to(num_values - (vector.size if alone else 0), best.cost.shape)
     probability = probability_of_cost(best.cost, np.maximum(freedom, 1))
+    # A prior pulls away from bounds, too, where all bands are saturated: no fit has to be exact.
+    determined = (freedom <= 0) & alone
     explained = np.where(
-        (freedom <= 0) | exact, best.cost <= EXACT_COST, probability >= SMALLEST_PROBABILITY
+        determined | exact, best.cost <= EXACT_COST, probability >= SMALLEST_PROBABILITY
     )
     apart = np.abs(np.asarray(rival.x) - np.asarray(best.x))
     if exact:

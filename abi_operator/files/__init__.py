@@ -8,6 +8,7 @@ defines, and computes nothing else. Whatever is wrong with a file is an `InputEr
 that can be shown to the user.
 """
 
+from .atomic import check_output_folder as check_output_folder
 from .atomic import output_folder as output_folder
 from .errors import InputError as InputError
 from .fires import read_fires as read_fires

@@ -51,9 +51,7 @@ def output_folder(
         Where the output cannot be written, or there is no room for it.
     """
     target = Path(path).absolute()
-    existing = next(folder for folder in (target, *target.parents) if folder.exists())
-    if not existing.is_dir():
-        raise InputError(f"{existing} is a file where a folder is needed; give another folder.")
+    existing = _existing(target)
     inside = os.path.ismount(target) or not os.access(target.parent, os.W_OK)
     beside = existing if existing != target or inside else target.parent
     places = {beside, *(place for place in (target, target.parent) if place.is_dir())}
@@ -80,6 +78,20 @@ def output_folder(
         finally:
             with suppress(OSError):
                 remove(temporary, but_parts=not whole)
+
+
+def check_output_folder(path: str | PathLike[str]) -> None:
+    """Raise `InputError` where an `output_folder` cannot be written, before it is needed."""
+    with _writable(_existing(Path(path).absolute())):
+        pass
+
+
+def _existing(target: Path) -> Path:
+    """The folder, or the nearest of those above it that is there."""
+    existing = next(folder for folder in (target, *target.parents) if folder.exists())
+    if not existing.is_dir():
+        raise InputError(f"{existing} is a file where a folder is needed; give another folder.")
+    return existing
 
 
 def _clear(folder: Path) -> str:

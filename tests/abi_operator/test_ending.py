@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from abi_operator import _ending
-from abi_operator.files import output_folder
+from abi_operator.files import Parts, output_folder
 
 ROOT = Path(__file__).parents[2]
 
@@ -36,6 +36,12 @@ with output_folder("out") as folder:
     print("begun", flush=True)
     {BUSY}
 """
+
+# The same of a run that has kept a part.
+KEEPING = UNFINISHED.replace('folder("out")', 'folder("out", keeps_parts=True)').replace(
+    "    print", '    Parts(folder).keep("first", {})\n    print'
+)
+KEEPING = KEEPING.replace("import output_folder", "import Parts, output_folder")
 
 # Several seconds of compiling, in a thread of the operator's as in a run.
 COMPILING = """
@@ -104,6 +110,19 @@ def test_it_ends_with_one_line_and_removes_what_is_unfinished(tmp_path, code, na
     assert code == 128 + number
     assert messages == f"abi-operator: {line}; what was unfinished has been removed.\n"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_run_keeps_is_said_and_found_by_the_next(tmp_path):
+    with begun(KEEPING, tmp_path) as process:
+        code, messages = ended(process, signal.SIGTERM)
+    (folder,) = tmp_path.iterdir()
+    assert code == 128 + signal.SIGTERM and not (folder / "result.nc").exists()
+    assert messages == (
+        "abi-operator: terminated; what was unfinished has been removed; what was simulated is "
+        f"kept in {folder}, and the same command goes on.\n"
+    )
+    with output_folder(tmp_path / "out", keeps_parts=True) as again:
+        assert again == folder and Parts(again).find("first") == {}
 
 
 def test_it_ends_with_one_line_while_jax_is_imported(tmp_path):

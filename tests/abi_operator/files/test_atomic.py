@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abi_operator.files import InputError, Parts, output_folder
+from abi_operator.files import InputError, Parts, check_output_folder, output_folder
 from abi_operator.files.abandoned import MARK
 
 
@@ -208,6 +208,9 @@ def test_a_folder_that_cannot_be_written_is_named_before_anything_is_computed(
         with output_folder(target):
             raise AssertionError
     assert list(tmp_path.iterdir()) == [target]
+    for path in (target, target / "deeper" / "still"):
+        with pytest.raises(InputError, match=r"out cannot be written to \(Read-only file system\)"):
+            check_output_folder(path)
 
 
 def test_a_writer_that_is_killed_at_any_step_leaves_what_another_one_mends(tmp_path):
