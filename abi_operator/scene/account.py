@@ -116,3 +116,13 @@ def _with_shares(attributes: dict[str, Attribute]) -> dict[str, Attribute]:
 def model_attributes(model: xr.Dataset) -> dict[str, Attribute]:
     """What a model Dataset says of the run, under names that tell so."""
     return {f"model_{name}": value for name, value in model.attrs.items()}
+
+
+def droplet_account(condensate: Hydrometeors, model: xr.Dataset) -> dict[str, Attribute]:
+    """What was assumed of the number of droplets."""
+    droplets = condensate.droplets
+    return {
+        "assumed_droplet_number": droplets.number.describe(model),
+        "assumed_droplet_number_source": droplets.source,
+        "assumed_droplet_number_count": condensate.paths["cloud"].num_assumed,
+    }

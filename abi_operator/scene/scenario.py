@@ -17,6 +17,7 @@ from ..satellites import SATELLITES, gas_fit_covers
 from .account import (
     condensate_account,
     condensate_warnings,
+    droplet_account,
     model_attributes,
     negative_account,
     pressure_range,
@@ -200,16 +201,7 @@ def scenario(
         "quality_flag": angle_flags(angles) | no_albedo,
     }
     fields |= by_direction | of_air | _paths(condensate, len(added_heights))
-    wavelengths = [BANDS[band].wavelength_um for band in bands]
-    dataset = xr.Dataset(
-        {name: (_dims(name), field, cf_attributes(name)) for name, field in fields.items()},
-        coords={name: (_dims(name), x, cf_attributes(name)) for name, x in position.items()}
-        | {
-            "band": ("band", list(bands), cf_attributes("band")),
-            "band_wavelength": ("band", wavelengths, cf_attributes("band_wavelength")),
-            "time": time,
-        },
-    )
+    dataset = _dataset(fields, position, bands, time)
     for species, specification in (plumes or {}).items():
         dataset = dataset.assign(plume_variables(species, specification, bands, rows))
     check_scenario(dataset, first_row=rows.start or 0)
@@ -223,9 +215,6 @@ def scenario(
         "sun_path": "flat" if flat_sun else "spherical",
         "air_above_model": "US Standard Atmosphere 1976, scaled to the pressure at the model's top",
         "num_levels_above_model": len(added_heights),
-        "assumed_droplet_number": condensate.droplets.number.describe(model),
-        "assumed_droplet_number_source": condensate.droplets.source,
-        "assumed_droplet_number_count": condensate.paths["cloud"].num_assumed,
     }
     return dataset.assign_attrs(
         model_attributes(model)
@@ -234,6 +223,7 @@ def scenario(
         | ground_sources
         | of_grounds
         | pressure_range(top_pressure)
+        | droplet_account(condensate, model)
         | condensate_account(condensate)
         | negative_account(model)
     )
@@ -249,6 +239,25 @@ def check_absorption(satellite: str, bands: Sequence[str], gases: Sequence[str])
                 f"the absorption by gases in {band} is not known of {satellite}; simulate without "
                 "gases, without this band, or of another satellite."
             )
+
+
+def _dataset(
+    fields: dict[str, np.ndarray],
+    position: dict[str, np.ndarray],
+    bands: Sequence[str],
+    time: np.ndarray,
+) -> xr.Dataset:
+    """Fields by name, with their coordinates and what the conventions want to be said of them."""
+    wavelengths = [BANDS[band].wavelength_um for band in bands]
+    return xr.Dataset(
+        {name: (_dims(name), field, cf_attributes(name)) for name, field in fields.items()},
+        coords={name: (_dims(name), x, cf_attributes(name)) for name, x in position.items()}
+        | {
+            "band": ("band", list(bands), cf_attributes("band")),
+            "band_wavelength": ("band", wavelengths, cf_attributes("band_wavelength")),
+            "time": time,
+        },
+    )
 
 
 def _paths(condensate: Hydrometeors, num_added: int) -> dict[str, np.ndarray]:
