@@ -23,11 +23,11 @@ _SOME_ALBEDO = 0.1  # of a ground that is none, where a rough one will do
 def need(column: Column, options: Options) -> Float[Array, "*batch"]:
     """How much of columns will be solved, for those that need alike to be solved together."""
     assert options.error_budget is not None
-    moments = column.moments[:, 1]
+    moments, degree = column.moments, options.num_streams // 2
     tau, ssa = column.tau, column.ssa
     if options.delta_m:
         scaled = scale_delta_m(tau, ssa, column.moments, options.num_streams)
-        tau, ssa, moments = scaled.tau, scaled.ssa, scaled.moments[:, 1]
+        tau, ssa, moments = scaled.tau, scaled.ssa, scaled.moments
     albedo = column.albedo
     if isinstance(albedo, AnySurface):
         albedo = jnp.full_like(column.mu0, _SOME_ALBEDO)
@@ -35,8 +35,9 @@ def need(column: Column, options: Options) -> Float[Array, "*batch"]:
     sun = jnp.broadcast_to(1 / column.mu0, tau.shape)
     ground = albedo * direct_transmission(tau, mu[None], sun)
     nothing, cosines = jnp.zeros_like(mu)[None], jnp.stack([column.mu0, mu])
-    known = expected(nothing, ground, tau, 1 - ssa, ssa * (1 - moments), cosines)
-    alike = Alike(tau, ssa, ssa * moments)
+    known = expected(nothing, ground, tau, 1 - ssa, ssa * (1 - moments[:, 1]), cosines)
+    further = ssa * moments[:, degree] if degree > 1 else None
+    alike = Alike(tau, ssa, ssa * moments[:, 1], further)
     if column.planck_levels is not None:
         warm = _warm(column, known, tau, 1 - ssa, albedo)
         known, alike = warm.known, alike._replace(planck=column.planck_levels, light=warm.light)
