@@ -109,6 +109,9 @@ def retrieve_pixels(
             found = begin(rows, guess[rows, k])
             best, other = _ranked(best, other, found, rows)
     final = np.where(attempted, judged(best, other), codes).astype(np.int8)
+    # Of bounds, and nothing else, nothing is known on the other side but the prior.
+    bounded = (observations.num_values == 0) & (final == ResultCode.SUCCESS)
+    final[bounded] = ResultCode.NOT_OBSERVABLE
     return Retrieved(best, final, other)
 
 
