@@ -1,10 +1,10 @@
-"""Retrievals against the known truth: closure, calibration, speed.
+"""Retrievals against the known truth: closure and calibration.
 
     python benchmarks/retrievals_against_truth.py [--pixels 512] [--streams 8] [--only NAMES]
 
 Random pixels of `benchmarks/retrievals_pixels.py`: clear air of 20 layers, everything a pixel's own
-(sun to 75 degrees, view to 70, albedo 0.01 to 0.4 in every band). Float64. Names are closure, fire,
-calibration and speed; without any all run, in some five minutes for 1,024 pixels on two cores.
+(sun to 75 degrees, view to 70, albedo 0.01 to 0.4 in every band). Float64. Names are closure, fire
+and calibration; without any all run, in some five minutes for 1,024 pixels on two cores.
 
 - closure: no noise and no prior, from C01 C02 C03; aod_550 0.05 to 4, ssa 0.80 to 0.99 in C01,
   effective radius over the most of a table. Printed are the shares of pixels whose optical depth is
@@ -15,8 +15,6 @@ calibration and speed; without any all run, in some five minutes for 1,024 pixel
   noise; a pixel that did not converge is not covered. The linearity test is that of
   `optimal_estimation`. In bins of the true optical depth coverage need not be that of all: a prior
   pulls the extremes inwards.
-- speed: three unknowns of smoke from C01 C02 C03 with noise and prior, compiling apart; only pixels
-  that agree with a tight solve within 0.1 posterior sigma count.
 """
 
 import argparse
@@ -24,15 +22,13 @@ import time
 
 import jax
 import numpy as np
-from retrievals_pixels import random_states
+from retrievals_pixels import BANDS, random_states, with_prior
 
 from abi_operator import Atmosphere, Fire, LiquidCloud, State
 from abi_operator.machine.speed import use_compilation_cache, use_compiler_flags
 from retrievals import (
     ForwardModel,
-    Minimiser,
     Observation,
-    Prior,
     ResultCode,
     measurement,
     prepared,
@@ -41,7 +37,6 @@ from retrievals import (
 from retrievals.declarations import fire, plume
 from retrievals.optimal_estimation import LARGEST_NONLINEARITY, estimates
 
-BANDS = ("C01", "C02", "C03")
 SECONDS = "seconds for all, compiling too"
 RADII = {"smoke": (0.08, 0.3), "ash": (0.6, 8.0)}
 
@@ -128,26 +123,6 @@ def fire_closure(num_pixels, streams):
     )
 
 
-def with_prior(num_pixels, streams, names):
-    """Noisy observations of pixels drawn from a prior."""
-    rng = np.random.default_rng(2)
-    states = random_states(rng, num_pixels, BANDS)
-    how = {"ssa": "ssa_shift" in names, "effective_radius": "effective_radius_um" in names}
-    vector = plume("smoke", **how)
-    mean = {"aod_550": 0.4, "ssa_shift": 0.0, "effective_radius_um": 0.14}
-    spread = {"aod_550": 0.7, "ssa_shift": 0.5, "effective_radius_um": 0.5}
-    prior = Prior(
-        np.asarray(vector.x(*(mean[name] for name in names))),
-        np.diag([spread[name] ** 2 for name in names]),
-    )
-    x = prior.x_prior + rng.standard_normal((num_pixels, len(names))) @ np.sqrt(prior.S_prior)
-    forward = prepared(ForwardModel(vector, BANDS, streams, gases=()), states)
-    seen = np.asarray(forward(x, states))
-    # The noise of the truth, which the retrieval takes from what was measured.
-    noisy = seen + measurement(seen, BANDS).sigma * rng.standard_normal(seen.shape)
-    return forward, measurement(noisy, BANDS), states, prior, x
-
-
 def calibration(num_pixels, streams):
     names = ("aod_550", "ssa_shift")
     forward, observation, states, prior, truth = with_prior(num_pixels, streams, names)
@@ -177,51 +152,11 @@ def calibration(num_pixels, streams):
             print(f"| {label} ({rows.sum()}) | {name} | {one} +- {error:.1f} | {two} |")
 
 
-def speed(num_pixels, streams):
-    names = ("aod_550", "ssa_shift", "effective_radius_um")
-    forward, observation, states, prior, _ = with_prior(num_pixels, streams, names)
-
-    def timed(how):
-        start = time.perf_counter()
-        retrieve_pixels(forward, observation, states, prior=prior, minimiser=how)
-        first = time.perf_counter() - start
-        seconds = []
-        for _ in range(3):
-            start = time.perf_counter()
-            found = retrieve_pixels(forward, observation, states, prior=prior, minimiser=how)
-            seconds.append(time.perf_counter() - start)
-        return found.inversion, min(seconds), first
-
-    start = time.perf_counter()
-    forward(np.asarray(prior.x_prior) + np.zeros((num_pixels, 1)), states)
-    start = time.perf_counter()
-    jax.block_until_ready(forward(prior.x_prior + np.zeros((num_pixels, 1)), states))
-    value = time.perf_counter() - start
-    tight = retrieve_pixels(
-        forward, observation, states, prior=prior, minimiser=Minimiser(1e-5, 80, starts="prior")
-    ).inversion
-    sigma = np.sqrt(np.diagonal(tight.covariance, axis1=1, axis2=2))
-    print(
-        f"\nspeed, {num_pixels} pixels, three unknowns, {streams} streams; the operator alone "
-        f"makes {num_pixels / value:.0f} pixels/s\n\n| solver | starts | steps | right [%] "
-        f"| right pixels/s | first answer [s] |\n|{' --- |' * 6}"
-    )
-    for solver in ("dogleg", "levenberg_marquardt"):
-        for starts in ("prior", "scan"):
-            found, seconds, first = timed(Minimiser(solver=solver, starts=starts))
-            right = found.converged & (np.abs(found.x - tight.x) <= 0.1 * sigma).all(axis=1)
-            print(
-                f"| {solver} | {starts} | {np.mean(found.num_steps):.1f} | {percent(right)} | "
-                f"{right.sum() / seconds:.0f} | {first - seconds:.0f} |",
-                flush=True,
-            )
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pixels", type=int, default=512)
     parser.add_argument("--streams", type=int, default=8)
-    parser.add_argument("--only", default="closure,fire,calibration,speed")
+    parser.add_argument("--only", default="closure,fire,calibration")
     arguments = parser.parse_args()
     use_compiler_flags()
     use_compilation_cache()
@@ -230,7 +165,6 @@ def main():
         "closure": closure,
         "fire": fire_closure,
         "calibration": calibration,
-        "speed": speed,
     }
     for name in arguments.only.split(","):
         studies[name](arguments.pixels, arguments.streams)

@@ -6,6 +6,10 @@ import numpy as np
 
 from abi_operator import Atmosphere, Geometry, LiquidCloud, Plume, State
 from abi_operator.optics import mie_optics
+from retrievals import ForwardModel, Prior, measurement, prepared
+from retrievals.declarations import plume as plume_vector
+
+BANDS = ("C01", "C02", "C03")
 
 NUM_LAYERS = 20
 TOP = 40e3
@@ -47,6 +51,32 @@ def random_states(rng, num_pixels, bands, species="smoke", albedo=(0.01, 0.4)):
         rng.uniform(0, np.pi, n),
     )
     return State(air, {band: rng.uniform(*albedo, n) for band in bands}, geometry)
+
+
+def pixels_of_prior(num_pixels, streams, names):
+    """Forward model, states, prior, x drawn from it, and a generator for what else is drawn."""
+    rng = np.random.default_rng(2)
+    states = random_states(rng, num_pixels, BANDS)
+    how = {"ssa": "ssa_shift" in names, "effective_radius": "effective_radius_um" in names}
+    vector = plume_vector("smoke", **how)
+    mean = {"aod_550": 0.4, "ssa_shift": 0.0, "effective_radius_um": 0.14}
+    spread = {"aod_550": 0.7, "ssa_shift": 0.5, "effective_radius_um": 0.5}
+    prior = Prior(
+        np.asarray(vector.x(*(mean[name] for name in names))),
+        np.diag([spread[name] ** 2 for name in names]),
+    )
+    x = prior.x_prior + rng.standard_normal((num_pixels, len(names))) @ np.sqrt(prior.S_prior)
+    return ForwardModel(vector, BANDS, streams, gases=()), states, prior, x, rng
+
+
+def with_prior(num_pixels, streams, names):
+    """Noisy observations of pixels drawn from a prior."""
+    forward, states, prior, x, rng = pixels_of_prior(num_pixels, streams, names)
+    forward = prepared(forward, states)
+    seen = np.asarray(forward(x, states))
+    # The noise of the truth, which the retrieval takes from what was measured.
+    noisy = seen + measurement(seen, BANDS).sigma * rng.standard_normal(seen.shape)
+    return forward, measurement(noisy, BANDS), states, prior, x
 
 
 def rows(tree, chosen):

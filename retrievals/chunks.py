@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, TypeVar
 
 import jax
@@ -41,14 +42,30 @@ def map_chunks(function: Callable[..., T], *arguments: PyTree, chunk: int | None
 
     def solve(start: int) -> T:
         with jax.enable_x64(x64):
-            rows = np.minimum(np.arange(start, start + chunk), num_pixels - 1)
-            result = function(*jax.tree.map(lambda x: jnp.asarray(x[rows]), arguments))
+            result = function(*jax.tree.map(partial(_filled, start, chunk), arguments))
             return jax.tree.map(np.asarray, result)
 
     first = solve(starts[0])  # compiles
     with ThreadPoolExecutor(usable_cores()) as pool:  # JAX computes without Python's global lock
         others = list(pool.map(solve, starts[1:]))
     return jax.tree.map(lambda *parts: np.concatenate(parts)[:num_pixels], first, *others)
+
+
+def _filled(start: int, chunk: int, array: np.ndarray) -> jax.Array:
+    """A chunk of an array, the last of its rows as often as there are too few."""
+    rows = array[start : start + chunk]
+    if len(rows) < chunk:
+        rows = np.concatenate(
+            [rows, np.broadcast_to(rows[-1:], (chunk - len(rows), *rows.shape[1:]))]
+        )
+    return jnp.asarray(rows)
+
+
+def with_rows(rows: np.ndarray, array: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """An array with other values in some rows."""
+    array = array.copy()
+    array[rows] = values
+    return array
 
 
 @contextmanager

@@ -40,6 +40,9 @@ class ForwardModel:
         Gases of the state that absorb.
     satellite
         Whose response and solar irradiance.
+    error_budget
+        Relative error that the solver may make for speed; see `abi_operator.brf`. None for no
+        error, as a fit that is to be exact needs it. [-]
     """
 
     vector: StateVector
@@ -48,6 +51,7 @@ class ForwardModel:
     num_doublings: int | None = None
     gases: tuple[str, ...] = ALL_GASES
     satellite: str = "GOES-16"
+    error_budget: float | None = None
 
     def state(self, x: Float[Array, "*batch x"], state: State) -> State:
         """Put x into a state."""
@@ -82,6 +86,7 @@ class ForwardModel:
             "num_streams": self.num_streams,
             "num_doublings": self.num_doublings,
             "satellite": self.satellite,
+            "error_budget": self.error_budget,
         }
         if THERMAL not in self.bands and full.fire is None:
             return reflectance_factor(full, self.bands, **settings)

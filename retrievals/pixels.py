@@ -1,32 +1,29 @@
 """Retrieve many pixels: scan, minimise from the best starts, judge."""
 
-from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Array
 
 from abi_operator import State
-from abi_operator.machine.sizes import chunk_of_pixels
 from abi_operator.machine.speed import Kept
 
-from .chunks import map_chunks, meanwhile
+from .chunks import map_chunks, meanwhile, with_rows
+from .coarse_to_fine import coarse, minimise_from_coarse
 from .first_guess import candidates, grid, scan
 from .forward import ForwardModel
 from .input_checks import checked
-from .inverse import DEFAULT_MINIMISER, Inversion, Minimiser, invert
+from .inverse import DEFAULT_MINIMISER, Inversion, Minimiser
+from .last_steps import prepare_to_finish
 from .observation import Observation
 from .prior import Prior
 from .quality import result_codes, same_solution
 from .results import ResultCode
+from .rounds import minimise, prepare_to_minimise
 
-ROUND_STEPS = 8
-"""Steps after which the pixels that need more of them continue together, in chunks of their own: a
-chunk lasts as long as its slowest pixel."""
-
+# Below this the first steps are by the whole forward model, too. [-]
+_TOLERANCE_OF_COARSE = 1e-2
 
 _UNSOLVED = (ResultCode.NOT_CONVERGED, ResultCode.NONFINITE, ResultCode.POOR_FIT)
 
@@ -74,15 +71,9 @@ def retrieve_pixels(
     """
     minimiser = minimiser.chosen(prior is not None)
     codes, observations, prior = checked(forward, observations, prior)
-    how = _in_rounds(forward, minimiser)
-    several = np.zeros(len(codes), bool)
-    if minimiser.starts == "prior" and prior is not None:
-        starts, guess = np.asarray(prior.x_prior)[:, None], np.zeros((len(codes), 1), int)
-    else:
-        first = _first_chunk(forward.vector.size, observations, states, prior)
-        with meanwhile(partial(_invert_chunk.prepare, how, *first)):
-            cost, starts = map_chunks(partial(_scan_chunk, forward), observations, states)
-        guess, several = candidates(cost, grid(forward.vector), minimiser.max_starts)
+    inputs = prior, observations, states
+    first_steps = _coarse(forward, minimiser, prior)
+    starts, guess, several = _starts(forward, first_steps, minimiser, inputs)
     attempted = codes == ResultCode.SUCCESS
     if prior is None:  # as many unknowns as measurements: several solutions may fit exactly
         determined = observations.num_values <= forward.vector.size
@@ -92,9 +83,12 @@ def retrieve_pixels(
     def begin(pixel: np.ndarray, guess: np.ndarray) -> Inversion:
         order = np.lexsort((pixel, guess))  # chunks of similar pixels, which take as many steps
         rows = pixel[order]
-        inputs = jax.tree.map(lambda x: np.asarray(x)[rows], (prior, observations, states))
+        some = jax.tree.map(lambda x: np.asarray(x)[rows], inputs)
         x_first = starts[rows, guess[order]]
-        solutions = _minimise(partial(_invert_chunk, how), minimiser, inputs, x_first)
+        if first_steps is None:
+            solutions = minimise(forward, minimiser, some, x_first)
+        else:
+            solutions = minimise_from_coarse(first_steps, forward, minimiser, some, x_first)
         return jax.tree.map(lambda x: x[np.argsort(order)], solutions)
 
     def judged(best: Inversion, other: Inversion) -> np.ndarray:
@@ -115,44 +109,35 @@ def retrieve_pixels(
     return Retrieved(best, final, other)
 
 
-def _in_rounds(forward: ForwardModel, minimiser: Minimiser) -> tuple[ForwardModel, Minimiser]:
-    """For some steps of a minimisation; the damping of Levenberg-Marquardt begins anew."""
-    return forward, minimiser._replace(max_steps=min(ROUND_STEPS, minimiser.max_steps))
+def _coarse(
+    forward: ForwardModel, minimiser: Minimiser, prior: Prior | None
+) -> ForwardModel | None:
+    """The forward model of the first steps; None where all of them are by the whole."""
+    wanted = minimiser.coarse_to_fine and (minimiser.tolerance or 0.0) >= _TOLERANCE_OF_COARSE
+    return coarse(forward) if wanted and prior is not None else None
 
 
-def _first_chunk(
-    size: int, observations: Observation, states: State, prior: Prior | None
-) -> tuple[Any, ...]:
-    """Pixels for which the program that minimises is compiled while another one scans."""
-    chunk = chunk_of_pixels()
-    rows = np.minimum(np.arange(chunk), len(observations.sigma) - 1)
-    some = jax.tree.map(lambda x: np.asarray(x)[rows], (prior, observations, states))
-    return *some, np.zeros((chunk, size), observations.sigma.dtype)
-
-
-def _minimise(
-    invert_chunk: Callable[..., Inversion],
+def _starts(
+    forward: ForwardModel,
+    first_steps: ForwardModel | None,
     minimiser: Minimiser,
     inputs: tuple[Prior | None, Observation, State],
-    x_first: np.ndarray,
-) -> Inversion:
-    """Minimise in rounds."""
-    solutions = map_chunks(invert_chunk, *inputs, x_first)
-    for _ in range(ROUND_STEPS, minimiser.max_steps, ROUND_STEPS):
-        rows = np.flatnonzero(~solutions.converged & np.isfinite(solutions.cost))
-        if rows.size == 0:
-            break
-        *some, before = jax.tree.map(lambda x, rows=rows: x[rows], (*inputs, solutions))
-        after = map_chunks(invert_chunk, *some, before.x)
-        after = eqx.tree_at(lambda s: s.num_steps, after, before.num_steps + after.num_steps)
-        solutions = jax.tree.map(partial(_with_rows, rows), solutions, after)
-    return solutions
-
-
-def _with_rows(rows: np.ndarray, array: np.ndarray, values: np.ndarray) -> np.ndarray:
-    array = array.copy()
-    array[rows] = values
-    return array
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where pixels may begin, in which order, and which of them have a second minimum."""
+    prior, observations, states = inputs
+    num_pixels = len(observations.sigma)
+    if minimiser.starts == "prior" and prior is not None:
+        none = np.zeros(num_pixels, bool)
+        return np.asarray(prior.x_prior)[:, None], np.zeros((num_pixels, 1), int), none
+    x = np.zeros((num_pixels, forward.vector.size), observations.sigma.dtype)
+    if first_steps is None:
+        prepare = partial(prepare_to_minimise, forward, minimiser, inputs, x)
+    else:
+        prepare = partial(prepare_to_finish, forward, inputs, x)
+    with meanwhile(prepare):
+        scan = partial(_scan_chunk, first_steps or forward)
+        cost, starts = map_chunks(scan, observations, states)
+    return starts, *candidates(cost, grid(forward.vector), minimiser.max_starts)
 
 
 @Kept
@@ -160,22 +145,6 @@ def _scan_chunk(
     forward: ForwardModel, observations: Observation, states: State
 ) -> tuple[jax.Array, jax.Array]:
     return jax.vmap(partial(scan, forward))(observations, states)
-
-
-@Kept
-def _invert_chunk(
-    how: tuple[ForwardModel, Minimiser],
-    prior: Prior | None,
-    observations: Observation,
-    states: State,
-    x_first: jax.Array,
-) -> Inversion:
-    forward, minimiser = how
-
-    def solve(prior: Prior | None, observation: Observation, state: State, x: Array) -> Inversion:
-        return invert(forward, observation, state, x, prior, minimiser)
-
-    return jax.vmap(solve)(prior, observations, states, x_first)
 
 
 def _ranked(
@@ -199,7 +168,7 @@ def _ranked(
     taken = ~same_solution(loser, new_first) & (vacant | (_rank(loser) < _rank(second)))
     kept = _either(vacant, new_first, second)
     new_second = _either(taken, loser, kept)
-    put = partial(_with_rows, rows)
+    put = partial(with_rows, rows)
     return jax.tree.map(put, best, new_first), jax.tree.map(put, other, new_second)
 
 

@@ -1,0 +1,188 @@
+r"""The last steps of a minimisation that has come near: few evaluations, none of them in vain.
+
+A chord, a value of the forward model with slopes of elsewhere, is a third as dear as a tangent, the
+value with its own. So a chord comes first, then a tangent with the posterior covariance; and where
+that step was not small another chord, or damped steps.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from abi_operator import State
+from abi_operator.machine.sizes import chunk_of_pixels
+from abi_operator.machine.speed import Kept
+
+from .chunks import map_chunks, with_rows
+from .forward import ForwardModel
+from .inverse import Inversion, Linear, Pixel
+from .observation import Observation
+from .prior import Prior
+from .rounds import Inputs
+
+_LAST_STEP = 0.05
+"""Largest step that may be the last, in posterior standard deviations. What is left is the square
+of it times the forward model's curvature, which is below 1 where error bars mean anything."""
+
+_MOST_DAMPED = 16  # steps, which few pixels need; where they are not enough, that is the result
+
+_MANY = 256  # pixels a chunk, where there are as many: to begin and to end one takes milliseconds
+
+
+class Moved(NamedTuple):
+    """After a step with a Jacobian of elsewhere: x, and whether the step is small. [-]"""
+
+    x: Float[Array | np.ndarray, "*batch x"]
+    near: Bool[Array | np.ndarray, "*batch"]
+
+
+class Found(eqx.Module):
+    """After a step of Gauss and Newton, and all residuals where that began."""
+
+    inversion: Inversion
+    here: Linear
+
+
+def finish(
+    forward: ForwardModel,
+    inputs: tuple[Prior, Observation, State],
+    x: np.ndarray,
+    jacobian: np.ndarray,
+    num_steps: np.ndarray,
+) -> Inversion:
+    """Take the last steps; `converged` where the very last is small.
+
+    Parameters
+    ----------
+    forward
+        The forward model.
+    inputs
+        Priors, measurements and states of the pixels.
+    x, jacobian
+        Where they have come to, and slopes of all residuals in z that are right nearly. [-]
+    num_steps
+        Evaluations so far. [-]
+    """
+    chunk = chunk_size(len(x))
+    chord, tangent = partial(_chord_chunk, forward), partial(_tangent_chunk, forward)
+    moved = map_chunks(chord, *inputs, x, jacobian, chunk=chunk)
+    found = map_chunks(tangent, *inputs, moved.x, chunk=chunk)
+    found = eqx.tree_at(lambda f: f.inversion.num_steps, found, num_steps + 2)
+    rows = _left(found)
+    if rows.size:
+        some, before = jax.tree.map(lambda x: x[rows], (inputs, found))
+        x = before.inversion.x
+        moved = map_chunks(chord, *some, x, before.here.jacobian, chunk=chunk)
+        x = np.where(moved.near[:, None], moved.x, x)
+        after = eqx.tree_at(
+            lambda f: (f.inversion.x, f.inversion.num_steps, f.inversion.converged),
+            before,
+            (x, before.inversion.num_steps + 1, moved.near),
+        )
+        found = jax.tree.map(partial(with_rows, rows), found, after)
+    return _damped(partial(map_chunks, tangent, chunk=chunk), inputs, found)
+
+
+def _damped(
+    tangent: Callable[..., Found], inputs: tuple[Prior, Observation, State], found: Found
+) -> Inversion:
+    """Go on with the pixels that have not converged, by Levenberg's damped steps."""
+    damping = np.zeros(len(found.inversion.x))
+    for _ in range(_MOST_DAMPED):
+        rows = _left(found)
+        if rows.size == 0:
+            break
+        some, before = jax.tree.map(lambda x, rows=rows: x[rows], (inputs, found))
+        z, residual, jacobian = before.here
+        normal = np.einsum("pri,prj->pij", jacobian, jacobian)
+        normal += damping[rows, None, None] * np.eye(z.shape[1])
+        step = -np.linalg.solve(normal, np.einsum("pri,pr->pi", jacobian, residual)[..., None])
+        moved = np.linalg.cholesky(some[0].S_prior) @ (z[..., None] + step)
+        after = tangent(*some, some[0].x_prior + moved[..., 0])
+        better = np.sum(after.here.residual**2, axis=1) <= np.sum(residual**2, axis=1)
+        after = jax.tree.map(partial(_chosen, better), after, before)
+        num_steps = before.inversion.num_steps + 1
+        after = eqx.tree_at(lambda f: f.inversion.num_steps, after, num_steps)
+        found = jax.tree.map(partial(with_rows, rows), found, after)
+        more, less = np.maximum(10 * damping[rows], 0.1), 0.1 * damping[rows]
+        damping[rows] = np.where(better, np.where(less < 1e-2, 0, less), more)
+    return found.inversion
+
+
+def _left(found: Found) -> np.ndarray:
+    """Pixels that have not converged, and may."""
+    inversion = found.inversion
+    return np.flatnonzero(~inversion.converged & np.isfinite(inversion.cost))
+
+
+def _chosen(choice: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Rows of one where chosen, and of the other elsewhere."""
+    return np.where(choice.reshape(-1, *[1] * (one.ndim - 1)), one, other)
+
+
+def prepare_to_finish(forward: ForwardModel, inputs: Inputs, x: np.ndarray) -> None:
+    """Compile what takes longest of `finish`, to be done while something else compiles, too."""
+    _tangent_chunk.prepare(forward, *_first_chunk((*inputs, x), len(x)))
+
+
+def prepare_chord(
+    forward: ForwardModel, inputs: Inputs, x: np.ndarray, jacobian: np.ndarray
+) -> None:
+    """The same of the rest."""
+    _chord_chunk.prepare(forward, *_first_chunk((*inputs, x, jacobian), len(x)))
+
+
+def _first_chunk(arrays: Any, num_pixels: int) -> Any:
+    rows = np.minimum(np.arange(chunk_size(num_pixels)), num_pixels - 1)
+    return jax.tree.map(lambda y: np.asarray(y)[rows], arrays)
+
+
+def chunk_size(num_pixels: int) -> int:
+    """Pixels that are taken together, of so many."""
+    few = chunk_of_pixels()
+    return few if num_pixels <= 4 * few else max(few, _MANY)
+
+
+@Kept
+def _chord_chunk(
+    forward: ForwardModel,
+    prior: Prior,
+    observations: Observation,
+    states: State,
+    x: jax.Array,
+    jacobian: jax.Array,
+) -> Moved:
+    def of_one(
+        prior: Prior, observation: Observation, state: State, x: Array, jacobian: Array
+    ) -> Moved:
+        pixel = Pixel.of(forward, observation, state, x, prior)
+        z = pixel.z(x)
+        step = Linear(z, pixel(z), jacobian).step
+        return Moved(pixel.x(z + step), in_sigmas(jacobian, step) < _LAST_STEP)
+
+    return jax.vmap(of_one)(prior, observations, states, x, jacobian)
+
+
+@Kept
+def _tangent_chunk(
+    forward: ForwardModel, prior: Prior, observations: Observation, states: State, x: jax.Array
+) -> Found:
+    def of_one(prior: Prior, observation: Observation, state: State, x: Array) -> Found:
+        pixel = Pixel.of(forward, observation, state, x, prior)
+        here = pixel.linear(pixel.z(x))
+        small = in_sigmas(here.jacobian, here.step) < _LAST_STEP
+        inversion = pixel.inversion(here, here.z, jnp.ones((), int), jnp.array(True))
+        return Found(eqx.tree_at(lambda i: i.converged, inversion, small), here)
+
+    return jax.vmap(of_one)(prior, observations, states, x)
+
+
+def in_sigmas(jacobian: Array, step: Array) -> Array:
+    """Length of a step in posterior standard deviations. [-]"""
+    return jnp.sqrt(jnp.sum((jacobian @ step) ** 2))

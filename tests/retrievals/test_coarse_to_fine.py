@@ -1,0 +1,62 @@
+"""The first steps by a coarse forward model lead to the minimum of the whole one."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from veil import TWO, Veil, veiled_pixels
+
+from retrievals import ForwardModel, Minimiser, Prior, retrieve_pixels
+from retrievals.coarse_to_fine import COARSE_STREAMS, coarse, minimise_from_coarse
+from retrievals.declarations import plume
+from retrievals.input_checks import checked
+from retrievals.kinds import BANDS
+
+# Posterior standard deviations: a last step of 0.05 leaves a fraction of itself.
+RIGHT = 0.05
+
+
+@dataclass(frozen=True)
+class Rough(Veil):
+    """The veil with reflectances that are off by some per cent, or no numbers at all."""
+
+    off: float = 0.0
+
+    def __call__(self, x, state):
+        return super().__call__(x, state) * (1 + self.off)
+
+
+@pytest.fixture(scope="module")
+def pixels():
+    """Measurements, states, prior, and the minima by tight steps of the whole forward model."""
+    observation, ground, _ = veiled_pixels()
+    prior = Prior(np.asarray(TWO.vector.x(0.4, 0.0)), np.diag([1.0, 0.02**2]))
+    tight = Minimiser(1e-8, 200, starts="prior")
+    found = retrieve_pixels(TWO, observation, ground, prior=prior, minimiser=tight)
+    assert found.inversion.converged.all()
+    return observation, ground, prior, found.inversion
+
+
+@pytest.mark.parametrize("off", [-0.1, np.nan])
+def test_however_rough_the_first_steps_are_the_minimum_is_the_same(pixels, off):
+    observation, ground, prior, tight = pixels
+    _, usable, own = checked(TWO, observation, prior)
+    rough = Rough(TWO.vector, off=off)
+    found = minimise_from_coarse(
+        rough, TWO, Minimiser().chosen(True), (own, usable, ground), own.x_prior
+    )
+    assert found.converged.all()
+    sigma = np.sqrt(np.diagonal(tight.covariance, axis1=1, axis2=2))
+    assert np.abs((found.x - tight.x) / sigma).max() < RIGHT
+    # Slopes are those one step before the end.
+    np.testing.assert_allclose(found.covariance, tight.covariance, rtol=0.1, atol=1e-4)
+    np.testing.assert_allclose(found.cost, tight.cost, rtol=1e-2, atol=1e-2)
+
+
+def test_the_coarse_model_is_cheaper_or_none():
+    forward = ForwardModel(plume("smoke"), BANDS, num_streams=8, num_doublings=3)
+    rough = coarse(forward)
+    assert rough is not None
+    assert (rough.num_streams, rough.num_doublings) == (COARSE_STREAMS, 3)
+    assert coarse(replace(forward, num_streams=COARSE_STREAMS)) is None
+    assert coarse(TWO) is None  # nothing is known of a forward model of one's own
