@@ -15,6 +15,9 @@ solvers of optimistix want all residuals at once. The posterior covariance is
 :math:`\sigma` is that of the prediction. It is kept through a minimisation, so that there is a cost
 to be lowered, and taken anew for a second one, from what the first has found.
 
+A plume is spread over the layers that its edges lie in, as it was when the scene was simulated:
+height moves an image smoothly within a layer, and its slope in steps from one to the next.
+
 There may be several minima (two heights, with gains to make up for the difference). So the fit
 begins at several points, with few of the pixels, and goes on with all of them from the two lowest
 minima that differ.
@@ -22,14 +25,13 @@ minima that differ.
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from abi_operator import State, with_plume_edges
+from abi_operator import State
 from abi_operator.machine.speed import Kept
 
 from ..chunks import map_chunks
@@ -40,7 +42,7 @@ from .plume_pixels import PlumePixels
 TOLERANCE = 1e-2
 """Length of the last step in posterior standard deviations; what is left is far smaller. [-]"""
 MAX_STEPS = 30
-SCOUTS = 128
+SCOUTS = 64
 """Pixels with which the minima are looked for. [-]"""
 STARTS = {"strength": (-1.5, 1.5), "height": (-1.0, 1.0, 2.0), "top": (-1.0, 1.0, 2.0)}
 """Where a fit begins beside the prior's mean, in standard deviations of the prior. [-]"""
@@ -117,8 +119,6 @@ class Problem(NamedTuple):
         Standard deviation of each band's gain, 0 where it is known. [-]
     error_of
         Standard deviations of measurements, of predictions (pixel, band). [-]
-    edges
-        Whether levels go with the plume's edges (`abi_operator.with_plume_edges`).
     """
 
     forward: ForwardModel
@@ -127,7 +127,6 @@ class Problem(NamedTuple):
     sigma_prior: np.ndarray
     gain_sigma: np.ndarray
     error_of: ErrorOf
-    edges: bool = False
 
     @property
     def free_gains(self) -> np.ndarray:
@@ -200,31 +199,17 @@ def image_of(problem: Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _image_of_block(
     problem: Problem, states: State, x: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    how = problem.forward, problem.edges
     count = states.geometry.solar_zenith.shape[0]
     rows = np.broadcast_to(x, (count, x.size))
-    return map_chunks(lambda *chunk: _image_chunk(how, *chunk), states, rows)
+    return map_chunks(lambda *chunk: _image_chunk(problem.forward, *chunk), states, rows)
 
 
 @Kept
-def _image_chunk(
-    how: tuple[ForwardModel, bool], states: State, x: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    return jax.vmap(partial(_image_of_one, how))(states, x)
+def _image_chunk(forward: ForwardModel, states: State, x: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def of_one(state: State, x: Float[Array, " x"]) -> tuple[Array, Array]:
+        return value_and_jacobian(lambda x: forward(x, state), x)
 
-
-def _image_of_one(
-    how: tuple[ForwardModel, bool], state: State, x: Float[Array, " x"]
-) -> tuple[Array, Array]:
-    forward, edges = how
-
-    def seen(x: Float[Array, " x"]) -> Float[Array, " band"]:
-        full = forward.state(x, state)
-        if edges:
-            full = replace(full, atmosphere=with_plume_edges(full.atmosphere))
-        return forward.measured(full)
-
-    return value_and_jacobian(seen, x)
+    return jax.vmap(of_one)(states, x)
 
 
 def _normal(problem: Problem, sigma: np.ndarray, z: np.ndarray) -> Normal:

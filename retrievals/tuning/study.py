@@ -23,7 +23,6 @@ from .plume_pixels import PlumePixels, error_of, plume_pixels
 from .product import fit_dataset, joined
 
 Where = Literal["plume", "clear"]
-_HEIGHTS = {"height", "top"}
 
 
 class Errors(NamedTuple):
@@ -135,7 +134,7 @@ def tuned(
             f"{pixels.counts.sum()} measurements in the plume cannot tell {vector.size} numbers."
         )
     with jax.enable_x64(True):
-        problem = _problem(image, vector, pixels, errors, edges=bool(_HEIGHTS & set(vector.names)))
+        problem = _problem(image, vector, pixels, errors)
         found = fit(problem)
         of_plume = found.normal.predicted
         maps = _factor(image, bands).copy(deep=True)
@@ -170,7 +169,7 @@ def numbers_of(
 
 
 def _problem(
-    image: xr.Dataset, vector: StateVector, pixels: PlumePixels, errors: Errors, *, edges: bool
+    image: xr.Dataset, vector: StateVector, pixels: PlumePixels, errors: Errors
 ) -> Problem:
     imager = imager_of(image)
     prior = vector.prior()
@@ -185,7 +184,6 @@ def _problem(
         np.sqrt(np.diag(np.asarray(prior.S_prior))),
         np.array(gains),
         partial(error_of, bands=pixels.bands, imager=imager, forward_error=errors.forward_error),
-        edges,
     )
 
 

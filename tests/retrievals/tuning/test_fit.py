@@ -26,7 +26,7 @@ def problem(image, numbers, observe_as):
     everywhere = np.ones((3, 8), bool)
     seen = observe_as(image["reflectance_factor"])
     pixels = plume_pixels(image, seen, everywhere, everywhere, ("C01", "C02", "C03"))
-    return _problem(image, numbers, pixels, NOISE_ALONE, edges=True)
+    return _problem(image, numbers, pixels, NOISE_ALONE)
 
 
 @pytest.fixture(scope="module")
