@@ -58,8 +58,8 @@ class Minimiser(NamedTuple):
         Of a scan: how often a pixel may begin whose fit is poor, or that has no more measurements
         than unknowns and may have several solutions.
     coarse_to_fine
-        Whether with a prior the scan and the first steps are by fewer streams (`coarse_to_fine`),
-        which takes a fifth of the time; not where the tolerance is below 1e-2.
+        Whether with a prior the scan and the first steps are by fewer streams (`coarse_to_fine`);
+        not where the tolerance is below 1e-2.
     """
 
     tolerance: float | None = None
