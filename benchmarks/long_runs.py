@@ -30,7 +30,7 @@ NAMES = ("simulate", "retrieve", "observe")
 HANGS = "fork"  # after JAX has begun, as README says
 PATIENCE = 120.0  # [s]
 # NetCDF keeps an index of the chunks of an open file in memory, some 4 kB for each block.
-FLAT = 8.0  # [kB a block]
+FLAT = 1.0  # [kB a block]
 
 
 def script(name, *words, cache, timeout=None):

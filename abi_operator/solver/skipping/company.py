@@ -48,7 +48,7 @@ def need(
     """
     alike, known, mu0, mu = jax.lax.stop_gradient((alike, known, mu0, mu))
     secants = 1 / mu0 + 1 / mu
-    allowed = budget.OF_MERGING * error_budget * known.least
+    allowed = budget.OF_MERGING * error_budget * known.least * jnp.minimum(mu0 + mu, 1)
     labels = group_labels(alike, Limits(0.5 * secants, allowed, float("inf")))
     depth = jnp.sum(alike.scattered * alike.tau, axis=0)
     twice = (depth / (1 + depth)) ** 2 * secants / (error_budget * known.least)

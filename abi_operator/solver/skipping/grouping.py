@@ -5,11 +5,12 @@ as apart but for the order in which light meets them. Of light that goes down an
 that is
 
 .. math:: \frac{|\Delta|}{2}\,\frac{sT}{1+sT}\,\frac{st}{1+s(T+t)}, \qquad
-   |\Delta| = |\Delta\omega| + |\Delta(\omega g)| + |\Delta(\omega\chi_k)|,
+   |\Delta| = (1 + \tfrac34 d) |\Delta\omega| + |\Delta(\omega g)| + |\Delta(\omega\chi_k)|,
 
 the first moment of what differs and one of half the streams' degree k, since layers with different
 phase functions may have one g (delta-M brings those of droplets of other sizes together), with
-rational functions in place of exponentials. From the top,
+rational functions in place of exponentials. In thick layers light is scattered many times, and
+absorbed as often as that: d is the smaller (1 - omega g) tau of the two. From the top,
 each layer joins the group above it while the sum of this over the group's members, seen through
 what lies above (1 / (1 + `ATTENUATION` times its backward depth)), stays below what the error
 budget allows; else it starts a new group.
@@ -35,6 +36,7 @@ ATTENUATION = 0.25
 """How the depth above, times 1 - g, hides what is below. [-]"""
 LEAST_SECANT = 2.0
 """Of light that has been scattered more than once, at least. [-]"""
+_DIFFUSED = 0.75  # times tau (1 - g): how often light is scattered in a layer, and may be absorbed
 _OFF = 0.25  # largest distance of a curve from its chord, over its range, of what bends evenly
 
 
@@ -139,7 +141,10 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
         t, w, f, q, faces = layer
         depth, total = group.tau, group.tau + t
         # Differences of omega and so on, times T: one quotient in all, as they take long.
-        difference = jnp.abs(group.scattered - w * depth) + jnp.abs(group.forward - f * depth)
+        sent_back = jnp.maximum(depth - group.forward, 0), jnp.maximum(t - f * t, 0)
+        often = 1 + _DIFFUSED * jnp.minimum(*sent_back)
+        absorbing = often * jnp.abs(group.scattered - w * depth)
+        difference = absorbing + jnp.abs(group.forward - f * depth)
         if group.further is not None:
             difference = difference + jnp.abs(group.further - q * depth)
         hidden = (1 + slant * depth) * (1 + slant * total) * (1 + ATTENUATION * group.above)
@@ -166,8 +171,7 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
             group.planck,
             span,
         )
-        backward = jnp.maximum(depth - group.forward, 0)
-        above = group.above + backward
+        above = group.above + sent_back[0]
         own = None if q is None else q * t
         fresh = _Group(t, w * t, f * t, own, 0 * t, above, group.label + 1, start, own_span)
         group = jax.tree.map(lambda x, y: jnp.where(new, x, y), fresh, joined)

@@ -146,6 +146,9 @@ def planned(
     if layers.tau.shape[0] > 1:
         secant = 0.5 * (layers.sun_secants[0] + jnp.max(view_secants, axis=0))
         allowed = budget.OF_MERGING * error_budget * known.least
+        # Of reflectances that are large by 1 / (mu0 + mu), where sun and view graze, as a loss is.
+        grazing = 1 / layers.sun_secants[0] + 1 / jnp.max(view_secants, axis=0)
+        allowed = allowed * jnp.minimum(grazing, 1)
         forward = layers.moments[1][:, 0] / 3
         alike = Alike(layers.tau, 1 - layers.coalbedo, forward, _middle(layers))
         if warm is not None:
