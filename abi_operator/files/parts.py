@@ -43,7 +43,8 @@ class Parts:
         path = self._path(name)
         unfinished = path.with_suffix(".unfinished")
         with unfinished.open("wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
+            # Before NumPy 2.2 `allow_pickle` would be one of the arrays.
+            np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]
         os.replace(unfinished, path)
 
     def _path(self, name: str) -> Path:
