@@ -100,10 +100,10 @@ def ice_geometric_asymmetry(
     wavelength_um
         Of the band. [um]
     """
-    size = fitted_size(size_um)
-    diffracted = diffraction_asymmetry(size * (0.75 / SIZE_PER_PATH), wavelength_um)
-    ssa = 1 - _cubic(fits.coalbedo, size)
-    return geometric_asymmetry(_cubic(fits.asymmetry, size), ssa, diffracted)
+    radius_um = fitted_size(size_um) * (0.75 / SIZE_PER_PATH)
+    diffracted = diffraction_asymmetry(radius_um, wavelength_um)
+    ssa = 1 - ice_coalbedo(size_um, fits)
+    return geometric_asymmetry(ice_asymmetry(size_um, fits), ssa, diffracted)
 
 
 def ice_coalbedo(size_um: Float[Array, "*n"], fits: Fu) -> Float[Array, "*n"]:

@@ -12,7 +12,8 @@ import pytest
 from abi_operator.atmosphere import Hydrometeor
 from abi_operator.bands import BANDS, several_bands
 from abi_operator.optics import from_effective_radius, hydrometeor, outside_fitted_range
-from abi_operator.optics.ice import SIZE_PER_PATH, ice_coalbedo
+from abi_operator.optics.diffraction import diffracted_share, diffraction_asymmetry
+from abi_operator.optics.ice import SIZE_PER_PATH, ice_asymmetry, ice_coalbedo
 from abi_operator.optics.ice_tables import FU
 from abi_operator.optics.rough_ice import rough_ice_geometric_asymmetry
 
@@ -64,7 +65,11 @@ def test_the_default_beside_rough_crystals_of_many_habits(make_atmosphere, refer
     np.testing.assert_allclose(ours[0], extinction, rtol=0.07)
     rows = [list(BANDS).index(band) for band in ABSORBING]
     np.testing.assert_allclose(ours[1][rows], coalbedo[rows], rtol=0.17)
-    # Largest in C07 at 10 um, below the sizes of Fu's fit.
+    size = jnp.asarray(SIZE_PER_PATH * 4 / 3 * radius)
+    fits = np.stack([ice_asymmetry(size, FU[band]) for band in BANDS])
+    apart = np.abs(fits - asymmetry)
+    assert apart[:-1].max() < 0.012 and apart[-1].max() < 0.022
+    # Put together by our absorption; largest in C07 at 10 um, below the sizes of Fu's fit.
     difference = np.abs(ours[2] - asymmetry)
     assert difference[:-1].max() < 0.014 and difference[-1].max() < 0.04
 
@@ -79,9 +84,15 @@ def test_means_over_intervals_absorb_too_much(reference):
 
 
 def test_rough_crystals_have_the_asymmetry_of_the_table(make_atmosphere, reference):
-    radius, *_, asymmetry = reference
+    radius, _, coalbedo, asymmetry = reference
     smooth = in_every_band(ice(make_atmosphere, radius))
     rough = in_every_band(ice(make_atmosphere, radius, "rough"))
+    for band, whole, lost in zip(BANDS, asymmetry, coalbedo, strict=True):
+        share = diffracted_share(jnp.asarray(1 - lost))
+        lobe = diffraction_asymmetry(jnp.asarray(radius), BANDS[band].wavelength_um)
+        rest = rough_ice_geometric_asymmetry(jnp.asarray(radius), band)
+        # The co-albedo has four digits: half of the last one is 1e-4 of what C07 does not diffract.
+        np.testing.assert_allclose(share * lobe + (1 - share) * rest, whole, rtol=0, atol=1.5e-4)
     # That of the table where nothing is absorbed; else by what of it our absorption diffracts.
     np.testing.assert_allclose(rough[2][:4], asymmetry[:4], rtol=0, atol=1e-4)  # four digits
     np.testing.assert_allclose(rough[2][:-1], asymmetry[:-1], rtol=0, atol=0.003)
