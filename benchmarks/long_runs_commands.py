@@ -104,7 +104,8 @@ def killed(place, name, kills, seed):
     """Kill a command at random moments, and run it again.
 
     Moments are of its time on processors, so that what else runs moves none. Programs are kept in
-    a folder that is empty at first, so that some kills fall into compiling.
+    a folder that is empty at first, so that the first kill may fall into compiling; the others are
+    drawn of the time that it takes once that is done.
     Every second time the next kill comes before the command has been run again.
     """
     if name != "simulate":
@@ -114,9 +115,10 @@ def killed(place, name, kills, seed):
     cache = place.folder / f"{name}-programs"
     rng = np.random.default_rng(seed)
     failed, states = [], Counter()
+    compiled = run(words, place.cache, place.fresh("killed", before)).seconds
     folder = place.fresh("killed", before)
     for number in range(kills):
-        moment = rng.uniform(0, 1.1) * place.seconds[name]
+        moment = rng.uniform(0, 1.1) * (compiled if number else place.seconds[name])
         ended = run(words, cache, folder, killed_after=moment)
         states["ended first" if ended.status == 0 else "killed"] += 1
         earlier, later = (differences(x / "out", folder / "out") for x in (before, whole))
