@@ -25,6 +25,7 @@ from .kept import Kept as Kept
 from .processor import processor_key, vector_bits
 from .processor import usable_cores as usable_cores
 
+_HALF_WRITTEN = "Error reading persistent compilation cache entry"
 _DEVICES = "xla_force_host_platform_device_count"
 
 # Bytes of compiled programs that are kept. A demonstration leaves 7 MB, of 40 programs.
@@ -105,8 +106,9 @@ def use_compiler_flags() -> int | None:
 def use_compilation_cache(folder: str | os.PathLike[str] | None = None) -> Path | None:
     """Keep compiled programs on disk: another process that needs them does not compile them.
 
-    Any number of processes may use a folder at once. What has not been used for longest is deleted
-    beyond 512 MB. Programs are code: a folder should be one's own, which the default is. Where
+    Any number of processes may use a folder at once: one that finds what another is writing, or
+    what one that was killed has left, compiles it, and JAX's warning of that is not shown. What has
+    not been used for longest is deleted beyond 512 MB. Programs are code: a folder should be one's own, which the default is. Where
     ``JAX_COMPILATION_CACHE_DIR`` is set, it stays, and so does what is set in `jax.config` unless
     a `folder` is given; ``JAX_ENABLE_COMPILATION_CACHE=0`` switches all of it off. In a folder
     that cannot be written nothing is kept, which is a warning. Nor does JAX keep a program that
@@ -146,6 +148,7 @@ def use_compilation_cache(folder: str | os.PathLike[str] | None = None) -> Path 
     if "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS" not in os.environ:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_compilation_cache_dir", str(place))
+    warnings.filterwarnings("ignore", _HALF_WRITTEN, UserWarning)
     reset_cache()
     return place
 
