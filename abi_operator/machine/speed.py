@@ -108,11 +108,12 @@ def use_compilation_cache(folder: str | os.PathLike[str] | None = None) -> Path 
 
     Any number of processes may use a folder at once: one that finds what another is writing, or
     what one that was killed has left, compiles it, and JAX's warning of that is not shown. What has
-    not been used for longest is deleted beyond 512 MB. Programs are code: a folder should be one's own, which the default is. Where
-    ``JAX_COMPILATION_CACHE_DIR`` is set, it stays, and so does what is set in `jax.config` unless
-    a `folder` is given; ``JAX_ENABLE_COMPILATION_CACHE=0`` switches all of it off. In a folder
-    that cannot be written nothing is kept, which is a warning. Nor does JAX keep a program that
-    calls Python, as `optimistix.least_squares` under `jax.jit` does unless given ``throw=False``.
+    not been used for longest is deleted beyond 512 MB. Programs are code: a folder should be one's
+    own, which the default is. Where ``JAX_COMPILATION_CACHE_DIR`` is set, it stays, and so does
+    what is set in `jax.config` unless a `folder` is given; ``JAX_ENABLE_COMPILATION_CACHE=0``
+    switches all of it off. In a folder that cannot be written nothing is kept, which is a warning.
+    Nor does JAX keep a program that calls Python, as `optimistix.least_squares` under `jax.jit`
+    does unless given ``throw=False``.
 
     On processors with AVX-512, jaxlib 0.9 to 0.10.1 calls on stderr every program that it loads one
     for another machine, for want of ``prefer-no-gather``, which no machine has. That is harmless;
