@@ -6,19 +6,24 @@ Random pixels of `benchmarks/retrievals_pixels.py`: clear air of 20 layers, ever
 (sun to 75 degrees, view to 70, albedo 0.01 to 0.4 in every band). Float64. Names are closure, fire
 and calibration; without any all run, in some five minutes for 1,024 pixels on two cores.
 
-- closure: no noise and no prior, from C01 C02 C03; aod_550 0.05 to 4, ssa 0.80 to 0.99 in C01,
-  effective radius over the most of a table. Printed are the shares of pixels whose optical depth is
-  right within 1e-3 at the solution, and at it or the second solution; whose brf fits within 1e-9;
-  and that are coded as having multiple solutions.
+- closure: no noise and no prior, from C01 C02 C03, and three unknowns from C01 C02 C03 C05 C06 as
+  well; aod_550 0.05 to 4, ssa 0.80 to 0.99 in C01, effective radius over the most of a table.
+  Printed are the shares of pixels whose optical depth is right within 1e-3 at the solution, and at
+  it or the second solution; whose brf fits within 1e-9; that fit and are wrong, which are second
+  roots, and of these how many are coded as having multiple solutions; then second roots by albedo
+  (the mean of the bands). Pixels of which no band tells (d brf / d ln aod below 1e-6) are counted
+  apart.
 - fire closure: C05 C06 C07, 450 to 1,200 K, fraction 1e-4 to 0.04, by day, unsaturated pixels.
 - calibration: truth drawn from the prior (0.7 in ln aod, 0.5 in the logit of ssa), the imager's
   noise; a pixel that did not converge is not covered. The linearity test is that of
-  `optimal_estimation`. In bins of the true optical depth coverage need not be that of all: a prior
-  pulls the extremes inwards.
+  `optimal_estimation`; coverage is that of its error bars, and that of the intervals of
+  `retrievals.intervals`. In bins of the true optical depth coverage need not be that of all: a
+  prior pulls the extremes inwards.
 """
 
 import argparse
 import time
+from itertools import pairwise
 
 import jax
 import numpy as np
@@ -35,9 +40,12 @@ from retrievals import (
     retrieve_pixels,
 )
 from retrievals.declarations import fire, plume
+from retrievals.intervals import posterior_intervals
 from retrievals.optimal_estimation import LARGEST_NONLINEARITY, estimates
 
 SECONDS = "seconds for all, compiling too"
+MORE_BANDS = (*BANDS, "C05", "C06")
+ALBEDOS = (0.0, 0.1, 0.2, 0.3, 0.4)
 RADII = {"smoke": (0.08, 0.3), "ash": (0.6, 8.0)}
 
 
@@ -57,39 +65,65 @@ def truth_of(rng, states, species, names):
     return [values[name] for name in names]
 
 
+CLOSURES = (
+    ("smoke", False, False, BANDS),
+    ("ash", False, False, BANDS),
+    ("smoke", True, False, BANDS),
+    ("ash", True, False, BANDS),
+    ("smoke", True, True, BANDS),
+    ("smoke", True, True, MORE_BANDS),
+)
+"""Species, whether ssa and effective radius are unknown beside optical depth, and bands."""
+
+
 def closure(num_pixels, streams):
-    heads = "| retrieved | aod, first | aod, either | brf 1e-9 | multiple | steps | " + SECONDS
-    print(f"\nshares of {num_pixels} pixels [%]:\n\n{heads} |\n|{' --- |' * 7}")
-    for species, ssa, radius in (
-        ("smoke", False, False),
-        ("smoke", True, False),
-        ("ash", True, False),
-        ("smoke", True, True),
-    ):
+    heads = ("retrieved", "bands", "blind", "aod, first", "aod, either", "brf 1e-9", "second roots")
+    heads += ("coded so", "steps", SECONDS)
+    print(f"\nshares of {num_pixels} pixels [%]:\n\n| {' | '.join(heads)} |")
+    print(f"|{' --- |' * len(heads)}")
+    roots = {}
+    for species, ssa, radius, bands in CLOSURES:
         rng = np.random.default_rng(7)
-        states = random_states(rng, num_pixels, BANDS, species)
+        states = random_states(rng, num_pixels, bands, species)
         vector = plume(species, ssa=ssa, effective_radius=radius)
         truth = truth_of(rng, states, species, vector.names)
-        forward = prepared(ForwardModel(vector, BANDS, streams, gases=()), states)
-        seen = np.asarray(forward(vector.x(*truth), states))
-        sigma = measurement(seen, BANDS).sigma
+        forward = prepared(ForwardModel(vector, bands, streams, gases=()), states)
+        x, sun = np.asarray(vector.x(*truth)), np.cos(states.geometry.solar_zenith)[:, None]
+        seen = np.asarray(forward(x, states))
+        more = np.asarray(forward(np.asarray(vector.x(truth[0] * 1.01, *truth[1:])), states))
+        blind = (np.abs(more - seen) / sun).max(axis=1) < 0.01 * 1e-6
+        sigma = measurement(seen, bands).sigma
         start = time.perf_counter()
         found = retrieve_pixels(forward, Observation(seen, sigma), states, exact=True)
         seconds = time.perf_counter() - start
         aod = [np.asarray(vector.values(s.x)["aod_550"]) for s in (found.inversion, found.other)]
         wrong = [np.abs(x - truth[0]) for x in aod]
-        departure = np.abs(np.asarray(forward(found.inversion.x, states)) - seen)
-        departure /= np.cos(states.geometry.solar_zenith)[:, None]
+        departure = np.abs(np.asarray(forward(found.inversion.x, states)) - seen) / sun
+        fits = departure.max(axis=1) <= 1e-9
+        second = fits & (wrong[0] > 1e-3)
+        coded = found.codes[second] == ResultCode.MULTIPLE_SOLUTIONS
         cells = (
-            percent(wrong[0] <= 1e-3),
-            percent(np.minimum(*wrong) <= 1e-3),
-            percent(departure.max(axis=1) <= 1e-9),
-            percent(found.codes == ResultCode.MULTIPLE_SOLUTIONS),
+            percent(blind),
+            percent(wrong[0][~blind] <= 1e-3),
+            percent(np.minimum(*wrong)[~blind] <= 1e-3),
+            percent(fits[~blind]),
+            percent(second),
+            percent(coded) if second.any() else "",
             f"{np.mean(found.inversion.num_steps):.1f}",
             f"{seconds:.0f}",
         )
-        label = f"{species}: {', '.join(vector.names)}"
+        label = f"{species}: {', '.join(vector.names)} | {len(bands)}"
         print(f"| {label} | {' | '.join(cells)} |", flush=True)
+        if second.any():
+            roots[label] = second, np.mean([states.albedo[band] for band in bands], axis=0)
+    print("\nsecond roots by mean albedo [%]:\n\n| retrieved | bands |", end="")
+    print("".join(f" {low:g} to {high:g} |" for low, high in pairwise(ALBEDOS)))
+    print(f"|{' --- |' * (len(ALBEDOS) + 1)}")
+    for label, (second, albedo) in roots.items():
+        shares = [
+            percent(second[(albedo > low) & (albedo <= high)]) for low, high in pairwise(ALBEDOS)
+        ]
+        print(f"| {label} | {' | '.join(shares)} |", flush=True)
 
 
 def fire_closure(num_pixels, streams):
@@ -130,26 +164,35 @@ def calibration(num_pixels, streams):
     inversion = found.inversion
     diagnosed = estimates(forward, observation, states, inversion.x, prior)
     linear = diagnosed.nonlinearity <= LARGEST_NONLINEARITY
+    within = posterior_intervals(forward, observation, states, inversion.x, diagnosed, prior)
     sigma = np.sqrt(np.diagonal(diagnosed.posterior_covariance, axis1=1, axis2=2))
-    ratio = np.abs(inversion.x - truth) / sigma
-    ratio[~inversion.converged] = np.inf
+    inside = np.abs(inversion.x - truth)[:, None] <= np.array([1.0, 1.96])[:, None] * sigma[:, None]
+    lowest, low, high, highest = np.moveaxis(within.bounds, 1, 0)
+    between = np.stack([(low <= truth) & (truth <= high), (lowest <= truth) & (truth <= highest)])
+    holds = np.stack([inside, np.moveaxis(between, 0, 1)], axis=1)  # pixel, way, width, quantity
+    holds &= np.asarray(inversion.converged)[:, None, None, None]
     print(
         f"\ncalibration, {num_pixels} pixels of smoke with noise and prior: "
         f"{percent(inversion.converged)} % converged, mean of cost / m "
         f"{np.mean(inversion.cost) / len(BANDS):.3f}, linear {percent(linear)} %\n\n"
-        f"| pixels | quantity | within 1 sigma [%] | within 1.96 sigma [%] |\n|{' --- |' * 4}"
+        "| pixels | quantity | within 1 sigma [%] | within 1.96 sigma [%] | in the 68 % interval | "
+        f"in the 95 % interval |\n|{' --- |' * 6}"
     )
     aod = np.asarray(forward.vector.values(truth)["aod_550"])
-    bins = [("all", np.ones(num_pixels, bool)), ("linear", linear)]
+    bins = [("all", np.ones(num_pixels, bool)), ("linear", linear), ("not linear", ~linear)]
     bins += [
         (f"linear, aod {low:g} to {high:g}", linear & (aod > low) & (aod <= high))
         for low, high in ((0, 0.2), (0.2, 0.5), (0.5, 1), (1, 10))
     ]
     for label, rows in bins:
-        error = 100 * np.sqrt(0.683 * 0.317 / max(rows.sum(), 1))
+        errors = [100 * np.sqrt(p * (1 - p) / max(rows.sum(), 1)) for p in (0.683, 0.95)]
         for i, name in enumerate(names):
-            one, two = (percent(ratio[rows, i] <= k) for k in (1.0, 1.96))
-            print(f"| {label} ({rows.sum()}) | {name} | {one} +- {error:.1f} | {two} |")
+            shares = [
+                f"{percent(holds[rows, way, width, i])} +- {errors[width]:.1f}"
+                for way in (0, 1)
+                for width in (0, 1)
+            ]
+            print(f"| {label} ({rows.sum()}) | {name} | {' | '.join(shares)} |", flush=True)
 
 
 def main():

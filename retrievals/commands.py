@@ -69,7 +69,7 @@ def retrieve(
     ] = None,
     diagnostics: Annotated[
         bool,
-        typer.Option(help="Write averaging kernels, gains and errors by source, too."),
+        typer.Option(help="Write averaging kernels, gains, errors by source and intervals, too."),
     ] = False,
     smooth: Annotated[
         float | None,

@@ -15,12 +15,13 @@ from abi_operator.nomenclature import PLUME, SCENARIO
 from abi_operator.scene import column_states, gases_of
 
 from .forward import ForwardModel, prepared
+from .intervals import posterior_intervals
 from .inverse import DEFAULT_MINIMISER, Minimiser
 from .observation import Observation, add_noise, observe, usable
 from .optimal_estimation import estimates
 from .pixels import retrieve_pixels
 from .prior import Prior
-from .product import Field, diagnostic_fields, make_product, pixel_fields
+from .product import Field, diagnostic_fields, interval_fields, make_product, pixel_fields
 from .results import ResultCode
 from .smooth import Smoothness, retrieve_smooth, smoothness
 from .state_vector import StateVector
@@ -96,7 +97,8 @@ def retrieve_image(
         ``prior_cost``, ``degrees_of_freedom``, ``num_values`` and ``num_steps``. As diagnostics
         ``averaging_kernel``, ``posterior_covariance`` and ``gain`` of x, ``residual``,
         ``information_content``, ``nonlinearity``, and of each quantity its ``_noise_error``,
-        ``_smoothing_error`` and ``_error_due_to_`` what is assumed.
+        ``_smoothing_error`` and ``_error_due_to_`` what is assumed, and the bounds of its intervals
+        (`retrievals.intervals`), ``_lower_68``, ``_upper_68``, ``_lower_95`` and ``_upper_95``.
 
     Raises
     ------
@@ -184,6 +186,8 @@ def retrieved_fields(
         x = np.asarray(retrieved.inversion.x)
         found = estimates(forward, observations, states, x, of_x, assumed)
         fields |= diagnostic_fields(vector, x, found, assumed)
+        within = posterior_intervals(forward, observations, states, x, found, of_x)
+        fields |= interval_fields(vector, within)
     return fields, retrieved.codes
 
 

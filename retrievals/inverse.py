@@ -56,7 +56,9 @@ class Minimiser(NamedTuple):
         and sees no second solution.
     max_starts
         Of a scan: how often a pixel may begin whose fit is poor, or that has no more measurements
-        than unknowns and may have several solutions.
+        than unknowns and may have several solutions. Of 3,000 random pixels of smoke, three
+        unknowns from three bands, 4 explained 99.77 % and found a second solution of 91 % of those
+        whose first was another than the truth; 8 99.97 and 99 %, 16 no more.
     coarse_to_fine
         Whether with a prior the scan and the first steps are by fewer streams (`coarse_to_fine`);
         not where the tolerance is below 1e-2.
@@ -66,7 +68,7 @@ class Minimiser(NamedTuple):
     max_steps: int = 40
     solver: str = "dogleg"
     starts: str = "scan"
-    max_starts: int = 4
+    max_starts: int = 8
     coarse_to_fine: bool = True
 
     def chosen(self, with_prior: bool) -> "Minimiser":

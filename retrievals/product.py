@@ -13,6 +13,7 @@ from abi_operator import State, __version__
 from abi_operator.machine.speed import Kept
 
 from .chunks import map_chunks
+from .intervals import LEVELS, Intervals
 from .optimal_estimation import Estimate
 from .pixels import Retrieved
 from .quality import sigmas
@@ -129,6 +130,30 @@ def diagnostic_fields(
             error = slopes[:, i] * found.parameter_error[:, j, i]
             words = f"standard deviation of {name} due to the {other.long_name}"
             fields[f"{name}_error_due_to_{other.name}"] = Field(error, units, words)
+    return fields
+
+
+def interval_fields(vector: StateVector, found: Intervals) -> dict[str, Field]:
+    """Bounds of the truth in the units of quantities.
+
+    Parameters
+    ----------
+    vector
+        Meaning of x.
+    found
+        Bounds of x.
+    """
+    by_level = [vector.values(jnp.asarray(found.bounds[:, level])) for level in range(len(LEVELS))]
+    fields = {}
+    for quantity in vector.quantities:
+        values = np.stack([np.asarray(values[quantity.name]) for values in by_level])
+        # NaN stays: of a pixel either all bounds are numbers or none is.
+        for bound, ordered in zip(LEVELS, np.sort(values, axis=0), strict=True):
+            side, share = bound.split("_")
+            words = f"{side} bound of {quantity.name}, which lies between both with {share} %"
+            fields[f"{quantity.name}_{bound}"] = Field(ordered, quantity.units, words)
+    words = "points that count in the intervals, which are not given below 20"
+    fields["interval_points"] = Field(np.asarray(found.effective_points), "1", words)
     return fields
 
 

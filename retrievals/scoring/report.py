@@ -11,6 +11,7 @@ from ..fire_detection import DETECTED
 from ..fires import SCORE
 from ..results import ResultCode, expected_error
 from .detection import Detection, detection
+from .held import SHARES, intervals_held
 from .metrics import Score, binned_scores, score
 from .truths import first_of, known_truths
 
@@ -52,6 +53,8 @@ def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:
         same under its name. By ``code``, ``code_count`` and ``code_share`` among pixels attempted
         or refused for another reason than the mask. By ``detection``, the numbers of
         `detection.Detection`, of fires and, where pixels without plume were attempted, of plumes.
+        ``interval_held``, by ``quantity`` and ``share``, is how often its intervals hold the truth,
+        where the retrieval has diagnostics.
     """
     kind = str(retrieval.attrs.get("kind", "smoke"))
     first = first_of(kind)
@@ -81,6 +84,11 @@ def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:
             )
             scores |= found
     report = xr.Dataset(_by_group(scores) | _by_code(codes))
+    held = intervals_held(retrieval, truths, success)
+    if held:
+        report = report.assign_coords(quantity=list(held), share=list(SHARES)).assign(
+            interval_held=(("quantity", "share"), np.array(list(held.values())))
+        )
     found = detected(result, retrieval, kind)
     if found is None:
         return report
@@ -209,6 +217,11 @@ def format_report(report: xr.Dataset) -> str:
             lines.append(f"{code}: {count} pixels, {100 * share:.1f} %")
             if code != "success":
                 lines.append(f"    {ResultCode[str(code).upper()].message}")
+    if "quantity" in report.coords:
+        for name in report["quantity"].values:
+            held = report["interval_held"].sel(quantity=name).values
+            shares = (f"{100 * x:.1f} in that of {y} %" for x, y in zip(held, SHARES, strict=True))
+            lines.append(f"intervals of {name}: of 100 truths {', '.join(shares)}")
     if "detection" in report.coords:
         lines.append(_sentence(Detection(*report["detection_value"].values)))
     return "\n".join(lines)

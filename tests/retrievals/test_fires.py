@@ -17,6 +17,7 @@ from retrievals import ResultCode, retrieve_fires
 from retrievals.commands import retrieve
 from retrievals.fire_detection import DETECTED, surroundings
 from retrievals.fires import SCORE, with_fire
+from retrievals.intervals import LEVELS
 
 BANDS = ("C05", "C06", "C07")
 HEIGHT = np.array([60e3, 11e3, 8e3, 0.0])
@@ -117,6 +118,8 @@ def test_fires_are_found_and_retrieved_by_day_and_by_night(burning):
     assert (
         of_fires(retrieval, "fire_temperature_error_due_to_surface_temperature") >= 0
     ).sum() >= 4
+    bounds = [of_fires(retrieval, f"fire_temperature_{bound}")[unsaturated] for bound in LEVELS]
+    assert (np.diff([*bounds[:2], kelvin, *bounds[2:]], axis=0) > 0).all()
 
 
 def test_neighbours_stand_for_the_ground(burning):

@@ -59,6 +59,21 @@ def test_the_table_is_plain_text(made_up):
     assert not any(line.startswith("aod_550 2-inf") for line in lines)
 
 
+def test_intervals_are_judged_by_how_often_they_hold_the_truth(made_up):
+    result, retrieval = made_up
+    assert "interval_held" not in score_retrieval(result, retrieval)
+    found = retrieval["aod_550"]
+    moved = {"lower_95": -0.3, "lower_68": -0.2, "upper_68": [-0.15, 0.0, 0.1], "upper_95": 0.2}
+    bounds = {
+        f"aod_550_{bound}": found + xr.DataArray(np.broadcast_to(by, 3), dims="x")
+        for bound, by in moved.items()
+    }
+    report = score_retrieval(result, retrieval.assign(bounds))  # all are 0.1 above the truth
+    np.testing.assert_allclose(report["interval_held"].values, [[2 / 3, 1.0]])
+    expected = "intervals of aod_550: of 100 truths 66.7 in that of 68 %, 100.0 in that of 95 %"
+    assert expected in format_report(report).split("\n")
+
+
 def test_what_else_is_known_is_scored_by_the_same_bins(made_up):
     result, retrieval = made_up
     radius = ("y", "x"), np.full((2, 3), 3.0)
