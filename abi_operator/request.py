@@ -53,8 +53,8 @@ class Request(NamedTuple):
     time
         Index or name of the times to simulate, as `files.WrfSeries.find` takes it; None for all.
     num_streams, error_budget
-        Streams of the solver, and the relative error that it may make for speed, as
-        `scene.simulate` takes them.
+        Streams of the solver or the relative error that they may leave, and that which may be made
+        for speed, as `scene.simulate` takes them.
     variables
         What the result keeps, as `files.stored` takes it.
     rayleigh_correction
@@ -85,7 +85,7 @@ class Request(NamedTuple):
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
     time: int | str | None = None
-    num_streams: int = 8
+    num_streams: float = 8
     error_budget: float | None = ERROR_BUDGET
     land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None

@@ -47,5 +47,6 @@ from .species import PlumeSpecification as PlumeSpecification
 from .species import classes_of as classes_of
 from .species import species_of as species_of
 from .standard_profile import nearest_standard_atmosphere as nearest_standard_atmosphere
+from .streams import most_streams as most_streams
 from .sun import SUN_PATHS as SUN_PATHS
 from .sun import sun_path_of as sun_path_of

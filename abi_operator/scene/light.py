@@ -40,6 +40,7 @@ class Unheard(NamedTuple):
 def light(
     states: State,
     flags: np.ndarray,
+    streams: np.ndarray,
     bands: tuple[str, ...],
     satellite: str,
     distance: float,
@@ -52,8 +53,8 @@ def light(
     ----------
     states
         Columns.
-    flags
-        Their ``quality_flag`` (column): which cannot be solved.
+    flags, streams
+        Their ``quality_flag`` (column): which cannot be solved; and streams of the solver (column).
     bands, satellite, distance
         Names of the bands, and of the satellite; distance of the sun. [AU]
     settings
@@ -62,7 +63,9 @@ def light(
         Is told of columns as they are solved, burning ones of C05 and C06 not twice.
     """
     with listening(listener):
-        fields = _of_sunlight(dataclasses.replace(states, fire=None), flags, bands, settings)
+        fields = _of_sunlight(
+            dataclasses.replace(states, fire=None), flags, streams, bands, settings
+        )
     irradiance = np.array([solar_irradiance(x, satellite) / (np.pi * distance**2) for x in bands])
     fields["radiance"] = fields["reflectance_factor"] * irradiance
     uncounted = None if listener is None else Unheard(listener)
@@ -71,15 +74,18 @@ def light(
         shines = _shining(states, flags, band)
         if not shines.any():
             continue
-        with listening(listener if band in THERMAL else uncounted):
-            seen = radiance(
-                _some(states, shines),
-                (band,),
-                satellite=satellite,
-                sun_distance=distance,
-                **settings,
-            )
-        fields["radiance"][shines, k] = np.asarray(seen)[:, 0]
+        for number in np.unique(streams[shines]):
+            chosen = shines & (streams == number)
+            with listening(listener if band in THERMAL else uncounted):
+                seen = radiance(
+                    _some(states, chosen),
+                    (band,),
+                    satellite=satellite,
+                    sun_distance=distance,
+                    num_streams=int(number),
+                    **settings,
+                )
+            fields["radiance"][chosen, k] = np.asarray(seen)[:, 0]
         if band not in THERMAL:
             factor = fields["radiance"][shines, k] / irradiance[k]
             fields["reflectance_factor"][shines, k] = factor
@@ -104,16 +110,22 @@ def _shining(states: State, flags: np.ndarray, band: str) -> np.ndarray:
 
 
 def _of_sunlight(
-    states: State, flags: np.ndarray, bands: tuple[str, ...], settings: dict[str, Any]
+    states: State,
+    flags: np.ndarray,
+    streams: np.ndarray,
+    bands: tuple[str, ...],
+    settings: dict[str, Any],
 ) -> dict[str, np.ndarray]:
     """Reflectance factor and brf (column, band) of the columns that can be solved."""
     solar = tuple(band for band in bands if band not in THERMAL)
     solved = (flags & _UNSOLVED) == 0
     values = np.full((len(flags), len(bands)), np.nan)
-    if solved.any() and solar:
-        index = np.array([bands.index(band) for band in solar])
-        for chosen, some in by_kind(_some(states, solved)):
-            values[np.ix_(np.flatnonzero(solved)[chosen], index)] = brf(some, solar, **settings)
+    index = np.array([bands.index(band) for band in solar], int)
+    for number in np.unique(streams[solved]) if solar else ():
+        alike = np.flatnonzero(solved & (streams == number))
+        for chosen, some in by_kind(jax.tree.map(lambda x, rows=alike: x[rows], states)):
+            found = brf(some, solar, num_streams=int(number), **settings)
+            values[np.ix_(alike[chosen], index)] = found
     factor = np.cos(states.geometry.solar_zenith)[:, None] * values
     in_sight = (flags & QUALITY_FLAGS["out_of_sight"]) == 0
     night = ((flags & QUALITY_FLAGS["night"]) > 0) & in_sight

@@ -35,7 +35,7 @@ def run(
     shape: tuple[int, int],
     write_block: WriteBlock,
     *,
-    num_streams: int = 8,
+    num_streams: float = 8,
     error_budget: float | None = ERROR_BUDGET,
     block_columns: int = 16384,
     progress: bool = True,

@@ -26,6 +26,7 @@ from .gases import check_gases, gases_attribute, gases_of
 from .kinds_of_ground import ground_flags
 from .light import Unheard, light
 from .parts import solved_or_found
+from .streams import most_streams, streams_of
 from .sun import sun_path_of
 
 ERROR_BUDGET = 1e-3
@@ -38,7 +39,7 @@ def simulate(
     *,
     bands: Sequence[str] | None = None,
     gases: Sequence[str] | None = None,
-    num_streams: int = 8,
+    num_streams: float = 8,
     error_budget: float | None = ERROR_BUDGET,
     listener: Listener | None = None,
     parts: Parts | None = None,
@@ -61,8 +62,10 @@ def simulate(
     gases
         Gases that absorb; None for those of the scenario (`gases_of`).
     num_streams, error_budget
-        Streams of the solver, and the relative error that it may make for speed on top of what they
-        leave; None solves everything. See `solver.Settings`.
+        Streams of the solver, or, below 1, the relative error that they may leave in 99 of 100
+        columns, by which each has as many as columns of its kind need (`scene.streams`); and the
+        relative error that may be made for speed on top of that, None for none. See
+        `solver.Settings`.
     listener
         Is told of columns as they are solved: all that can be in the bands without emission, then
         all that can be in each of the others.
@@ -83,6 +86,8 @@ def simulate(
     ------
     InputError
         Where gases are asked for that the scenario does not have.
+    ValueError
+        Where more streams would be needed than `scene.streams` knows of.
     """
     if bands is None:
         bands = tuple(str(band) for band in scenario["band"].values)
@@ -90,7 +95,8 @@ def simulate(
     gases = gases_of(scenario) if gases is None else check_gases(tuple(gases))
     if gases and "vapour" not in scenario:
         raise InputError(f"the scenario has no gases of which {', '.join(gases)} could absorb.")
-    states = column_states(scenario, bands, num_streams=num_streams)
+    most = most_streams(num_streams)
+    states = column_states(scenario, bands, num_streams=most)
     satellite = str(scenario.attrs.get("satellite", "GOES-16"))
     distance = sun_distance(scenario["time"].values) if "time" in scenario.variables else 1.0
     settings = {"gases": gases, "num_streams": num_streams, "error_budget": error_budget}
@@ -102,8 +108,9 @@ def simulate(
     def solve() -> dict[str, np.ndarray]:
         with listening(None if listener is None else Unheard(listener)):
             depths = _optical_depths(states.atmosphere, bands)
-        flags = flags_with(depths)
-        return depths | light(states, flags, bands, satellite, distance, settings, listener)
+        flags, streams = flags_with(depths), streams_of(states.atmosphere, num_streams)
+        others = {name: value for name, value in settings.items() if name != "num_streams"}
+        return depths | light(states, flags, streams, bands, satellite, distance, others, listener)
 
     fields = solved_or_found(parts, scenario, {"bands": bands, **settings}, solve)
     flags = flags_with(fields)
@@ -119,7 +126,8 @@ def simulate(
     result["quality_flag"] = known.dims, flags.reshape(known.shape), known.attrs
     # Of NetCDF's attributes none is no number: nothing is left out.
     left_out = {} if error_budget is None else {"error_budget": error_budget}
-    how = {"num_streams": num_streams, "gases": gases_attribute(gases)}
+    how = {"num_streams": most, "gases": gases_attribute(gases)}
+    how |= {"streams_error": num_streams} if num_streams < 1 else {}
     clouds = optics_attributes(cloud_optics_of(scenario), ice_optics_of(scenario))
     return result.assign_attrs(how | clouds | left_out | {"sun_path": sun_path_of(scenario)})
 

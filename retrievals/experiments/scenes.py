@@ -1,4 +1,4 @@
-"""Made-up pixels of the experiments: air, grounds, smoke and ash, of which all is known."""
+"""Made-up pixels of the experiments: air, grounds and plumes, of which all is known."""
 
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -18,9 +18,9 @@ from abi_operator.surface import modis_to_abi, ocean
 from abi_operator.surface.ocean import WATER_REFLECTANCE
 from abi_operator.surface.ross_li import WHITE_SKY
 
-RADIUS_UM = {"smoke": 0.14, "ash": 3.0}
+RADIUS_UM = {"smoke": 0.14, "ash": 3.0, "dust": 1.5}
 """Effective radius of a plume's particles where nobody says another. [um]"""
-BASE = {"smoke": 1.5e3, "ash": 6e3}
+BASE = {"smoke": 1.5e3, "ash": 6e3, "dust": 2e3}
 """Height of its lower edge. [m]"""
 THICKNESS = 1.5e3
 """Height of its upper edge above that. [m]"""

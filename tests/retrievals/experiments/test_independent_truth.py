@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from retrievals.experiments import independent_truth
-from retrievals.experiments.independent_truth import _drawn, _uneven
+from retrievals.experiments.independent_case import STRIPS, uneven
+from retrievals.experiments.independent_clouds import independent_cloud
+from retrievals.experiments.independent_fires import independent_fire
+from retrievals.experiments.independent_plumes import RADII_UM, independent_plume
 
 
 @pytest.mark.slow
@@ -18,25 +21,70 @@ def test_a_covariance_of_the_forward_model_widens_the_error_bars():
     assert ((table["forward_error"] > 0.005) & (table["forward_error"] < 0.3)).all()
 
 
-def test_the_cells_of_a_pixel_have_its_mean():
-    cells, believed, aod, ssa = _drawn(np.random.default_rng(0), "ash", 4)
-    factors = _uneven(np.random.default_rng(0), 50, 0.3)
+def test_factors_of_strips_have_a_mean_of_one():
+    factors = uneven(np.random.default_rng(0), 50, 0.3)
     np.testing.assert_allclose(factors.mean(axis=1), 1, rtol=1e-12)
     assert 0.2 < factors.std() < 0.4
-    plume = cells.atmosphere.plumes["ash"]
-    np.testing.assert_allclose(plume.aod_550.reshape(4, 5).mean(axis=1), aod, rtol=1e-12)
-    for band, albedo in cells.albedo.items():
+
+
+@pytest.mark.parametrize("species", sorted(RADII_UM))
+def test_the_strips_of_a_plume_have_its_mean(species):
+    case = independent_plume(species)
+    drawn = case.draw(np.random.default_rng(0), 4)
+    plume = drawn.cells.atmosphere.plumes[species]
+    aod, ssa = drawn.truth
+    np.testing.assert_allclose(plume.aod_550.reshape(4, STRIPS).mean(axis=1), aod, rtol=1e-12)
+    for band, albedo in drawn.cells.albedo.items():
         np.testing.assert_allclose(
-            albedo.reshape(4, 5).mean(axis=1), believed.albedo[band], rtol=1e-12
+            albedo.reshape(4, STRIPS).mean(axis=1), drawn.believed.albedo[band], rtol=1e-12
         )
-    np.testing.assert_allclose(plume.base[::5] - believed.atmosphere.plumes["ash"].base, 500)
-    assert ssa.shape == (4, 3) and ((ssa > 0.9) & (ssa < 1)).all()
+    believed = drawn.believed.atmosphere.plumes[species]
+    np.testing.assert_allclose(plume.base[::STRIPS] - believed.base, 500)
+    assert ((ssa > 0.85) & (ssa < 1)).all()
+
+
+def test_the_strips_of_a_cloud_have_its_thickness_and_droplets():
+    """As the state vector reads them; and its droplets grow upwards."""
+    case = independent_cloud()
+    drawn = case.draw(np.random.default_rng(0), 4)
+    liquid = drawn.cells.atmosphere.liquid
+    thickness, radius = (quantity.get(liquid) for quantity in case.vector.quantities)
+    np.testing.assert_allclose(thickness.reshape(4, STRIPS).mean(axis=1), drawn.truth[0], rtol=1e-9)
+    np.testing.assert_allclose(radius[::STRIPS], drawn.truth[1], rtol=1e-9)
+    np.testing.assert_allclose(radius[1::STRIPS], drawn.truth[1], rtol=1e-9)
+    ratio = np.asarray(liquid.mass_path / np.where(liquid.mass_path > 0, liquid.number_path, 1))
+    top, below = (ratio[:, layer] for layer in np.flatnonzero(ratio[0]))
+    np.testing.assert_allclose(top / below, 8, rtol=1e-9)
+    values = case.vector.values(drawn.x)
+    np.testing.assert_allclose(values["cloud_optical_thickness"], drawn.truth[0], rtol=1e-9)
+
+
+def test_the_strips_of_a_fire_emit_what_it_does():
+    case = independent_fire()
+    drawn = case.draw(np.random.default_rng(0), 4)
+    fire, (kelvin, share) = drawn.cells.fire, drawn.truth
+    np.testing.assert_allclose(fire.fraction.reshape(4, STRIPS).mean(axis=1), share, rtol=1e-12)
+    power = np.asarray(fire.fraction * fire.temperature**4).reshape(4, STRIPS).mean(axis=1)
+    np.testing.assert_allclose(power, share * kelvin**4, rtol=1e-12)
+    ground = np.asarray(drawn.cells.surface_temperature).reshape(4, STRIPS)
+    believed = drawn.believed.surface_temperature
+    np.testing.assert_allclose(ground.mean(axis=1), believed, rtol=1e-12)
+    more = drawn.cells.atmosphere.gases.vapour[0] / drawn.believed.atmosphere.gases.vapour[0]
+    np.testing.assert_allclose(more, 1.2, rtol=1e-12)
 
 
 @pytest.mark.slow
 def test_error_bars_hold_the_truth_once_the_forward_model_has_one():
-    """At the size of the command, and another seed than its own."""
-    table = independent_truth(seed=5)
+    """Of plumes, at the size of the command, and another seed than its own."""
+    table = independent_truth(seed=5, kinds=["smoke", "ash"])
     depth = table.sel(quantity=["smoke aod_550", "ash aod_550"])["coverage_68"]
     assert (depth.isel(S_obs=0) < 0.5).all()
     assert (depth.isel(S_obs=1) >= 0.6).all()
+
+
+@pytest.mark.slow
+def test_so_do_those_of_cloud_and_fires():
+    table = independent_truth(seed=5, kinds=["cloud", "fire"], true_streams=12)
+    coverage = table["coverage_68"]
+    assert (coverage.isel(S_obs=1) >= 0.6).all()
+    assert (coverage.isel(S_obs=0) < coverage.isel(S_obs=1)).any()
