@@ -13,6 +13,7 @@ own, under `jax.jit`, and `use_compilation_cache` compiles them once and not in 
 from . import _ending as _ending
 from ._version import __version__ as __version__
 from .atmosphere import Atmosphere as Atmosphere
+from .atmosphere import BackgroundAerosol as BackgroundAerosol
 from .atmosphere import Fire as Fire
 from .atmosphere import Gases as Gases
 from .atmosphere import Hydrometeor as Hydrometeor
@@ -26,6 +27,7 @@ from .geometry import Geometry as Geometry
 from .machine.speed import use_compilation_cache as use_compilation_cache
 from .machine.speed import use_full_speed as use_full_speed
 from .optics import ash as ash
+from .optics import background_aerosol as background_aerosol
 from .optics import mie_plume as mie_plume
 from .optics import smoke as smoke
 from .plume_edges import with_plume_edges as with_plume_edges

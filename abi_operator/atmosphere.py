@@ -116,6 +116,29 @@ class MiePlume(eqx.Module):
         return self.brightness * self.extinction_550 * (self.top - self.base)
 
 
+class BackgroundAerosol(eqx.Module):
+    """Aerosol that is everywhere, the thinner the higher, as plumes are beside it.
+
+    Its extinction falls with height z above the ground by ``exp(-z / scale_height)`` up to the
+    first level, so that the column's optical depth at 550 nm is `aod_550` whatever the levels.
+
+    Parameters
+    ----------
+    aod_550
+        Optical depth at 550 nm. [-]
+    scale_height
+        Height by which extinction falls to 1 / e. [m]
+    relative_extinction, ssa, asymmetry
+        By band: extinction relative to 550 nm, single-scattering albedo, asymmetry factor. [-]
+    """
+
+    aod_550: Float[Array, "*batch"]
+    scale_height: Float[Array, "*batch"]
+    relative_extinction: dict[str, Float[Array, "*batch"]]
+    ssa: dict[str, Float[Array, "*batch"]]
+    asymmetry: dict[str, Float[Array, "*batch"]]
+
+
 class Hydrometeor(eqx.Module):
     """Particles of one hydrometeor class in each layer, by mass and number.
 
@@ -187,6 +210,8 @@ class Atmosphere(eqx.Module):
         Gases that absorb; None for air without them.
     hydrometeors
         Hydrometeor classes by name (``"rain"``, ``"snow"``), beside `liquid`.
+    background
+        Aerosol beside the plumes; None for none.
     """
 
     pressure: Float[Array, "*batch level"]
@@ -196,6 +221,7 @@ class Atmosphere(eqx.Module):
     temperature: Float[Array, "*batch level"] | None = None
     gases: Gases | None = None
     hydrometeors: dict[str, Hydrometeor] = eqx.field(default_factory=dict)
+    background: BackgroundAerosol | None = None
 
     @property
     def counted_pressure(self) -> Float[Array, "*batch level"]:

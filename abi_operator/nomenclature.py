@@ -149,6 +149,22 @@ OPTIONAL: dict[str, Variable] = {
 """What a scenario has where gases or emission are simulated. Of hydrometeors other than cloud water
 it has ``{class}_mass_path`` and ``{class}_number_path`` (layer, y, x)."""
 
+BACKGROUND: dict[str, Variable] = {
+    "background_aod_550": Variable((), "1", "optical depth of the background aerosol at 550 nm"),
+    "background_scale_height": Variable((), "m", "height by which it falls to 1 / e"),
+    "background_relative_extinction": Variable(
+        ("band",), "1", "extinction of the background aerosol relative to 550 nm"
+    ),
+    "background_ssa": Variable(
+        ("band",), "1", "single-scattering albedo of the background aerosol"
+    ),
+    "background_asymmetry": Variable(("band",), "1", "asymmetry factor of the background aerosol"),
+    "background_optical_depth": Variable(
+        ("band", "y", "x"), "1", "optical depth of the background aerosol"
+    ),
+}
+"""What a scenario has where there is aerosol beside the plumes, and, the last, its result."""
+
 GROUND: dict[str, Variable] = {
     "volume_kernel_weight": Variable(
         ("band", "y", "x"), "1", "weight of the Ross-Thick kernel in the reflectance of the land"
@@ -250,6 +266,7 @@ def variable(name: str) -> Variable | None:
         RESULT,
         SCENARIO,
         OPTIONAL,
+        BACKGROUND,
         GROUND,
         FIRE,
         OPTIONAL_RESULT,

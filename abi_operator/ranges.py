@@ -109,6 +109,7 @@ STATE: dict[str, Range] = {
     "base": _EDGE,
     "top": _EDGE,
     "aod_550": _NOT_NEGATIVE,
+    "scale_height": Range(0.0, _INF, "()", "m"),
     "extinction_550": Range(0.0, _INF, "[)", "m-1"),
     "brightness": SHARE,
     "relative_extinction": _NOT_NEGATIVE,

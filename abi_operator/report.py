@@ -62,6 +62,8 @@ def account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
         yield f"ozone, and vapour and temperature above: {account['standard_atmosphere']}"
     yield f"gases that absorb: {account['gases']}"
     yield f"optics of cloud droplets: {_CLOUD_OPTICS[str(account['cloud_optics'])]}"
+    if "background_aerosol" in account:
+        yield f"background aerosol: {account['background_aerosol']}"
     for name in CLASSES:
         if f"assumed_{name}_number_count" in account:
             yield f"number of {name}, assumed: as the microphysics {account['microphysics']} does"

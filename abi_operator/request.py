@@ -48,6 +48,8 @@ class Request(NamedTuple):
         Table of fires, as `files.read_fires` takes it.
     gases, hydrometeors, microphysics, droplet_number, cloud_optics, ice_optics, flat_sun
         As `scene.scenario` takes them; of hydrometeors, None means all that the model has.
+    background_aerosol
+        Optical depth at 550 nm of aerosol beside the plume, None for none. [-]
     satellite, satellite_longitude
         Name; degrees, east positive, where it does not stand at its usual place.
     time
@@ -82,6 +84,7 @@ class Request(NamedTuple):
     cloud_optics: str = LIQUID_OPTICS[0]
     ice_optics: str = ICE_OPTICS[0]
     flat_sun: bool = False
+    background_aerosol: float | None = None
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
     time: int | str | None = None

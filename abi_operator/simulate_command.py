@@ -129,6 +129,14 @@ def simulate(
     plume_aod: Annotated[
         float, typer.Option(min=0, help="Optical depth of the plume at 550 nm where it is white.")
     ] = 2.0,
+    background_aerosol: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            help="Optical depth at 550 nm of aerosol that is everywhere, thinning upwards by 1/e "
+            "in 2 km, with the optics of smoke: 0.1 is usual over land. None without.",
+        ),
+    ] = None,
     fires: Annotated[
         Path | None,
         typer.Option(
@@ -277,6 +285,7 @@ def simulate(
         cloud_optics=cloud_optics,
         ice_optics=ice_optics,
         flat_sun=flat_sun,
+        background_aerosol=background_aerosol,
         satellite=satellite,
         satellite_longitude=satellite_longitude,
         num_streams=streams,

@@ -38,6 +38,7 @@ from .scene import (
     CLASSES,
     PlumeSpecification,
     check_absorption,
+    check_background_aerosol,
     check_classes,
     check_cloud_optics,
     check_emissivity,
@@ -118,6 +119,7 @@ def open_scene(request: Request) -> Scene:
     check_microphysics(request.microphysics)
     check_cloud_optics(request.cloud_optics)
     check_ice_optics(request.ice_optics)
+    check_background_aerosol(request.background_aerosol)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
     check_variables(request.variables)
@@ -223,6 +225,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         cloud_optics=request.cloud_optics,
         ice_optics=request.ice_optics,
         flat_sun=request.flat_sun,
+        background_aerosol=request.background_aerosol,
         standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )

@@ -156,6 +156,8 @@ def specified_bands(state: State) -> tuple[str, ...]:
     for plume in air.plumes.values():
         if isinstance(plume, Plume):
             held &= set(plume.ssa)
+    if air.background is not None:
+        held &= set(air.background.ssa)
     if air.temperature is None or state.surface_temperature is None:
         held -= set(THERMAL)
     return tuple(band for band in BANDS if band in held)

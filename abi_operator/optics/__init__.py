@@ -1,15 +1,16 @@
 """What the matter of one column does to light in one band.
 
 Each producer reads an `Atmosphere` and a `Band` and returns `OpticalProperties` with layers from
-the top: `rayleigh` for air, `gas_absorption` for its gases, `aerosol` for one plume, `liquid_cloud`
-for droplets, `hydrometeor` for a class of any other particles. They are added with ``+``;
-`column_optics` adds them all. `smoke` and `ash` make plumes with published optics, every number of
-which can be replaced, `mie_plume` one whose optics follow from the size of its particles. The
-functions are written for one column and know neither streams nor surface: batch them with
-`jax.vmap`.
+the top: `rayleigh` for air, `gas_absorption` for its gases, `aerosol` for one plume, `background`
+for the aerosol beside plumes, `liquid_cloud` for droplets, `hydrometeor` for a class of any other
+particles. They are added with ``+``; `column_optics` adds them all. `smoke` and `ash` make plumes
+with published optics, every number of which can be replaced, `mie_plume` one whose optics follow
+from the size of its particles. The functions are written for one column and know neither streams
+nor surface: batch them with `jax.vmap`.
 """
 
 from .aerosol import aerosol as aerosol
+from .aerosol import background as background
 from .cloud import liquid_cloud as liquid_cloud
 from .column import column_optics as column_optics
 from .droplets import effective_radius as effective_radius
@@ -33,5 +34,6 @@ from .phase import RayleighPhase as RayleighPhase
 from .phase import TwoTermHenyeyGreenstein as TwoTermHenyeyGreenstein
 from .rayleigh import rayleigh as rayleigh
 from .species import ash as ash
+from .species import background_aerosol as background_aerosol
 from .species import mie_plume as mie_plume
 from .species import smoke as smoke

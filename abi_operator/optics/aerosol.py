@@ -1,9 +1,9 @@
-"""Scattering and absorption by one aerosol plume."""
+"""Scattering and absorption by one aerosol plume, and by the aerosol beside plumes."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..atmosphere import Atmosphere, MiePlume, Plume
+from ..atmosphere import Atmosphere, BackgroundAerosol, MiePlume, Plume
 from ..bands import AnyBand, entry, first_missing
 from ..optical_properties import OpticalProperties, Scatterer
 from .mie_aerosol import mie_optics
@@ -77,7 +77,41 @@ def aerosol(atmosphere: Atmosphere, plume: str, band: AnyBand) -> OpticalPropert
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 
-def _specified(properties: Plume, plume: str, band: AnyBand) -> tuple[Array, Array, Array]:
+def background(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
+    r"""Optical properties of the aerosol that is everywhere.
+
+    .. math:: \tau_k = r_\mathrm{band}\, \tau_{550}\,
+       \frac{e^{-z_{k+1} / H} - e^{-z_k / H}}{1 - e^{-z_0 / H}}
+
+    with the heights z of the levels above the ground, the first one being the top, and the scale
+    height H; its phase function is that of Henyey and Greenstein.
+
+    Parameters
+    ----------
+    atmosphere
+        One column, which has a `BackgroundAerosol`.
+    band
+        Band, for which that must be specified.
+
+    Raises
+    ------
+    ValueError
+        Where the atmosphere has none, or it no such band.
+    """
+    properties = atmosphere.background
+    if properties is None:
+        raise ValueError("the atmosphere has no background aerosol.")
+    relative, ssa, asymmetry = _specified(properties, "background", band)
+    above_ground = atmosphere.height - atmosphere.height[-1]
+    beneath = -jnp.expm1(-above_ground / properties.scale_height)
+    extinction = relative * properties.aod_550 * -jnp.diff(beneath) / beneath[0]
+    scatterer = Scatterer(ssa * extinction, HenyeyGreenstein(asymmetry))
+    return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
+
+
+def _specified(
+    properties: Plume | BackgroundAerosol, plume: str, band: AnyBand
+) -> tuple[Array, Array, Array]:
     """Relative extinction, single-scattering albedo and asymmetry factor in a band. [-]"""
     values = []
     for name in ("relative_extinction", "ssa", "asymmetry"):

@@ -12,7 +12,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.typing import ArrayLike
 
-from ..atmosphere import MiePlume, Plume
+from ..atmosphere import BackgroundAerosol, MiePlume, Plume
 from ..bands import GRASSO2013, check_bands
 from ..ranges import STATE
 from .aerosol_tables import ASH, SMOKE, AerosolOptics
@@ -94,6 +94,57 @@ def ash(
     return _plume("ash", extent, ASH, given, bands)
 
 
+BACKGROUND_SCALE_HEIGHT = 2000.0
+"""Height by which background aerosol falls to 1 / e, as 6S has it. [m]"""
+
+
+def background_aerosol(
+    aod_550: ArrayLike,
+    *,
+    scale_height: ArrayLike = BACKGROUND_SCALE_HEIGHT,
+    bands: Sequence[str] = GRASSO2013,
+    relative_extinction: Mapping[str, ArrayLike] | None = None,
+    ssa: Mapping[str, ArrayLike] | None = None,
+    asymmetry: Mapping[str, ArrayLike] | None = None,
+) -> BackgroundAerosol:
+    """Aerosol that is everywhere beside the plumes, by default with the optics of smoke.
+
+    Smoke is the one species here of fine particles, which most of the optical depth of continental
+    air is due to; in the visible it scatters 0.93 of what it takes away, polluted continental air
+    0.89 (Hess et al. 1998 [1]_, at 550 nm and 80 % humidity). Its scale height is that by which 6S [2]_
+    thins aerosol upwards. Arguments broadcast, as those of `smoke`.
+
+    Parameters
+    ----------
+    aod_550
+        Optical depth at 550 nm. [-]
+    scale_height
+        Height by which extinction falls to 1 / e. [m]
+    bands
+        Bands for which it is specified.
+    relative_extinction, ssa, asymmetry
+        By band, in place of those of smoke. [-]
+
+    Raises
+    ------
+    ValueError
+        Where a value is out of its range (`ranges.STATE`), unless it is traced.
+
+    References
+    ----------
+    .. [1] M. Hess et al., "Optical properties of aerosols and clouds: the software package OPAC",
+       Bull. Amer. Meteor. Soc., 79, 831-844, 1998,
+       doi:10.1175/1520-0477(1998)079<0831:OPOAAC>2.0.CO;2
+    .. [2] E. F. Vermote et al., "Second simulation of the satellite signal in the solar spectrum,
+       6S: an overview", IEEE Trans. Geosci. Remote Sens., 35, 675-686, 1997, doi:10.1109/36.581987
+    """
+    extent = {"aod_550": aod_550, "scale_height": scale_height}
+    given = {"relative_extinction": relative_extinction, "ssa": ssa, "asymmetry": asymmetry}
+    everything = _broadcast(extent | _completed("background aerosol", SMOKE, given, bands))
+    _check("background aerosol", everything)
+    return BackgroundAerosol(**everything)
+
+
 def mie_plume(
     species: str,
     aod_550: ArrayLike,
@@ -147,16 +198,8 @@ def _plume(
     given: dict[str, Mapping[str, ArrayLike] | None],
     bands: Sequence[str],
 ) -> Plume:
-    """Complete `published` by what is `given` and bring all to one dtype and shape."""
-    bands = check_bands(bands)
-    optics = {}
-    for name, values in given.items():
-        values = values or {}
-        unknown = [band for band in values if band not in bands]
-        if unknown:
-            raise ValueError(f"{name} of {species} is given in {unknown}, outside {bands=}.")
-        optics[name] = {band: values.get(band, getattr(published, name)[band]) for band in bands}
-    plume = _broadcast(extent | optics)
+    """A plume with the `published` optics, completed by what is `given`."""
+    plume = _broadcast(extent | _completed(species, published, given, bands))
     _check(species, plume)
     return Plume(
         base=plume["base"],
@@ -167,6 +210,24 @@ def _plume(
         ssa=plume["ssa"],
         asymmetry=plume["asymmetry"],
     )
+
+
+def _completed(
+    species: str,
+    published: AerosolOptics,
+    given: dict[str, Mapping[str, ArrayLike] | None],
+    bands: Sequence[str],
+) -> dict[str, dict[str, ArrayLike]]:
+    """Optics by band: `published` ones, unless others are `given`."""
+    bands = check_bands(bands)
+    optics = {}
+    for name, values in given.items():
+        values = values or {}
+        unknown = [band for band in values if band not in bands]
+        if unknown:
+            raise ValueError(f"{name} of {species} is given in {unknown}, outside {bands=}.")
+        optics[name] = {band: values.get(band, getattr(published, name)[band]) for band in bands}
+    return optics
 
 
 def _broadcast(plume: dict) -> dict:
@@ -190,8 +251,8 @@ def _check(species: str, plume: dict) -> None:
         for band, x in by_band:
             label = name if band is None else f"{name}[{band!r}]"
             _refuse(species, label, x, STATE[name].holds, STATE[name].words)
-    base = plume["base"]
-    if not isinstance(base, Tracer):
+    base = plume.get("base")
+    if base is not None and not isinstance(base, Tracer):
         _refuse(species, "top", plume["top"], lambda top: top > base, "above base")
 
 

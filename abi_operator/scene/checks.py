@@ -9,6 +9,7 @@ import xarray as xr
 from ..files import InputError
 from ..nomenclature import QUALITY_FLAGS
 from ..ranges import FINITE, STATE, WEATHER, Range
+from .background import QUANTITIES
 from .species import classes_of, species_of
 
 _OF_PLUMES = (
@@ -81,6 +82,10 @@ def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
     for name, allowed in _OPTIONAL.items():
         if name in scenario:
             yield _inside(name, scenario[name].values, allowed)
+    if "background_aod_550" in scenario:
+        for quantity in QUANTITIES:
+            name = f"background_{quantity}"
+            yield _inside(name, scenario[name].values, STATE[quantity])
     if "fire_fraction" in scenario:
         hot = _inside("fire_temperature", scenario["fire_temperature"].values, STATE["temperature"])
         yield hot._replace(holds=hot.holds | (scenario["fire_fraction"].values == 0))

@@ -6,12 +6,23 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..atmosphere import Atmosphere, Fire, Gases, Hydrometeor, LiquidCloud, MiePlume, Plume, State
+from ..atmosphere import (
+    Atmosphere,
+    BackgroundAerosol,
+    Fire,
+    Gases,
+    Hydrometeor,
+    LiquidCloud,
+    MiePlume,
+    Plume,
+    State,
+)
 from ..bands import GRASSO2013, check_bands
 from ..files.mcd43 import KERNELS
 from ..geometry import Geometry
 from ..nomenclature import GROUND, PLUME
 from ..radiance import THERMAL
+from .background import BY_BAND, QUANTITIES
 from .cloud_optics import cloud_optics_of, ice_optics_of
 from .grounds import land_and_sea
 from .species import classes_of, species_of
@@ -42,10 +53,10 @@ def column_states(
     -------
     State
         NumPy arrays with a leading column axis on every leaf; of columns y, x that of x runs
-        faster. Gases, temperatures, hydrometeors, anisotropic grounds and fires are those that the
-        scenario has, and
-        clouds scatter as its attributes say (`cloud_optics_of`, `ice_optics_of`), through which a
-        low sun, where there is one, shines likewise (`spherical_somewhere`).
+        faster. Gases, temperatures, hydrometeors, background aerosol, anisotropic grounds and fires
+        are those that the scenario has, and clouds scatter as its attributes say
+        (`cloud_optics_of`, `ice_optics_of`), through which a low sun, where there is one, shines
+        likewise (`spherical_somewhere`).
     """
     bands = check_bands(bands, [str(band) for band in scenario["band"].values])
     reader = _Reader(scenario)
@@ -84,6 +95,7 @@ def column_states(
         temperature=reader.optional("temperature", "level"),
         gases=gases,
         hydrometeors=hydrometeors,
+        background=_background(reader, bands),
     )
     return State(
         atmosphere,
@@ -154,6 +166,18 @@ def _fire(reader: _Reader) -> Fire:
     # Of a fire that is none nothing is seen, but a number has to be there.
     temperature: Any = np.where(fraction > 0, hot, _NO_FIRE)
     return Fire(fraction, temperature)
+
+
+def _background(reader: _Reader, bands: tuple[str, ...]) -> BackgroundAerosol | None:
+    if not reader.has("background_aod_550"):
+        return None
+    fields: dict[str, Any] = {
+        name: reader.by_band(f"background_{name}", bands)
+        if name in BY_BAND
+        else reader.values(f"background_{name}")
+        for name in QUANTITIES
+    }
+    return BackgroundAerosol(**fields)
 
 
 def _plume(reader: _Reader, species: str, bands: tuple[str, ...]) -> Plume:

@@ -24,6 +24,7 @@ from .account import (
 )
 from .albedo import surface_albedo
 from .angles import SATELLITE_LONGITUDE, angle_flags, find_angles
+from .background import background_attribute, background_variables
 from .checks import check_scenario
 from .cloud_optics import check_cloud_optics, check_ice_optics, optics_attributes
 from .column_air import complete_air, completion_heights, highest_top
@@ -63,6 +64,7 @@ def scenario(
     standard_atmosphere: str | None = None,
     added_heights: Sequence[float] | None = None,
     fires: xr.Dataset | None = None,
+    background_aerosol: float | None = None,
     rows: slice = slice(None),
 ) -> xr.Dataset:
     """Specify a scene, or a block of its rows, from a model's output.
@@ -131,6 +133,9 @@ def scenario(
     fires
         Fires of the whole scene, as `files.read_fires` returns them; None if there is none. The
         blocks of a scene need the same.
+    background_aerosol
+        Optical depth at 550 nm of aerosol that is everywhere (`optics.background_aerosol`), None
+        for none. [-]
     rows
         The rows of the scene that `model` holds.
 
@@ -204,6 +209,9 @@ def scenario(
     dataset = _dataset(fields, position, bands, time)
     for species, specification in (plumes or {}).items():
         dataset = dataset.assign(plume_variables(species, specification, bands, rows))
+    if background_aerosol is not None:
+        dataset = dataset.assign(background_variables(background_aerosol, bands))
+        assumed |= background_attribute(background_aerosol)
     check_scenario(dataset, first_row=rows.start or 0)
     for sentence in condensate_warnings(condensate):
         warnings.warn(sentence, UserWarning, stacklevel=2)

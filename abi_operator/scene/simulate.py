@@ -17,7 +17,7 @@ from ..machine.chunks import map_chunks
 from ..machine.listening import Listener, listening
 from ..machine.sizes import chunks_to_read
 from ..nomenclature import variable
-from ..optics import aerosol, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
+from ..optics import aerosol, background, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
 from ..quality import flags_from
 from .angles import sun_distance
 from .cloud_optics import cloud_optics_of, ice_optics_of, optics_attributes
@@ -153,6 +153,8 @@ def _optical_depths(atmosphere: Atmosphere, bands: tuple[str, ...]) -> dict[str,
 def _depths_of_chunk(leaves: list[jax.Array], structure: Any, bands: tuple[str, ...]) -> Any:
     def depths(column: Atmosphere) -> dict[str, jax.Array]:
         producers = {"rayleigh": rayleigh, "liquid": liquid_cloud}
+        if column.background is not None:
+            producers["background"] = background
         producers |= {name: partial(_aerosol, species=name) for name in column.plumes}
         producers |= {name: partial(_hydrometeor, name=name) for name in column.hydrometeors}
         by_band = {

@@ -1,0 +1,51 @@
+"""Aerosol beside the plumes as variables of a scenario: the same in all columns."""
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from ..files import InputError
+from ..files.netcdf import cf_attributes
+from ..optics import background_aerosol
+
+QUANTITIES = ("aod_550", "scale_height", "relative_extinction", "ssa", "asymmetry")
+"""Fields of `BackgroundAerosol`, as variables behind ``background_``."""
+BY_BAND = ("relative_extinction", "ssa", "asymmetry")
+"""Those of them that are specified by band."""
+
+
+def check_background_aerosol(aod_550: float | None) -> None:
+    """Raise `InputError` unless an optical depth is none or a finite number of 0 or more."""
+    if aod_550 is not None and not 0 <= aod_550 < math.inf:
+        raise InputError(
+            f"the background aerosol has an optical depth of 0 or more; got {aod_550}."
+        )
+
+
+def background_variables(aod_550: float, bands: tuple[str, ...]) -> dict[str, xr.DataArray]:
+    """Variables of a background aerosol (`optics.background_aerosol`) for a scenario.
+
+    Parameters
+    ----------
+    aod_550
+        Its optical depth at 550 nm. [-]
+    bands
+        Bands of the scenario.
+    """
+    check_background_aerosol(aod_550)
+    aerosol = background_aerosol(aod_550, bands=bands)
+    found = {}
+    for quantity in QUANTITIES:
+        value, name = getattr(aerosol, quantity), f"background_{quantity}"
+        by_band = quantity in BY_BAND
+        values = np.array([value[band] for band in bands] if by_band else value, np.float64)
+        dims = ("band",) if by_band else ()
+        found[name] = xr.DataArray(values, dims=dims, attrs=cf_attributes(name))
+    return found
+
+
+def background_attribute(aod_550: float) -> dict[str, str]:
+    """What is said of it."""
+    words = f"optical depth {aod_550:g} at 550 nm, falling by 1 / e in 2 km, optics of smoke"
+    return {"background_aerosol": words}
