@@ -111,8 +111,8 @@ def background_aerosol(
 
     Smoke is the one species here of fine particles, which most of the optical depth of continental
     air is due to; in the visible it scatters 0.93 of what it takes away, polluted continental air
-    0.89 (Hess et al. 1998 [1]_, at 550 nm and 80 % humidity). Its scale height is that by which 6S [2]_
-    thins aerosol upwards. Arguments broadcast, as those of `smoke`.
+    0.89 (Hess et al. 1998 [1]_, at 550 nm and 80 % humidity). Its scale height is that by which
+    6S [2]_ thins aerosol upwards. Arguments broadcast, as those of `smoke`.
 
     Parameters
     ----------
