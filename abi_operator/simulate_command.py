@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from . import option_texts
 from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence, typed, user_warnings
@@ -17,11 +18,10 @@ from .machine.speed import usable_cores
 from .microphysics import SCHEMES
 from .optics import ALL_GASES
 from .satellites import SATELLITES
-from .scene import CLASSES, ERROR_BUDGET, DropletNumber, most_streams
+from .scene import CLASSES, ERROR_BUDGET, DropletNumber
 from .simulation import Report, Request, Species, open_scene, pictures_of_before, simulate_scene
 from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
 
-_ALL, _NONE = "all", "none"
 _IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
 
 
@@ -147,14 +147,14 @@ def simulate(
     ] = None,
     gases: Annotated[
         str, typer.Option(help=f"Gases that absorb: all, none, or some of {', '.join(ALL_GASES)}.")
-    ] = _ALL,
+    ] = option_texts.ALL,
     hydrometeors: Annotated[
         str,
         typer.Option(
             help="Rain and ice to simulate beside cloud water: all that WRFOUT has, none, or some "
             f"of {', '.join(CLASSES)}."
         ),
-    ] = _ALL,
+    ] = option_texts.ALL,
     microphysics: Annotated[
         str | None,
         typer.Option(
@@ -230,7 +230,7 @@ def simulate(
             "the air's layers, a fifth of the size or less; or names such as "
             "reflectance_factor,radiance."
         ),
-    ] = _ALL,
+    ] = option_texts.ALL,
     rayleigh_correction: Annotated[
         bool,
         typer.Option(
@@ -252,11 +252,11 @@ def simulate(
 
     `abi-operator demo --size 16` makes files to try it with.
     """
-    streams = _streams(num_streams)
+    streams = option_texts.streams(num_streams)
     if not error_budget < 1:
         raise typer.BadParameter(f"an error budget is below 1; got {error_budget}.")
     try:
-        names = check_bands(_names(bands, _IMAGER_BANDS))
+        names = check_bands(option_texts.names(bands, _IMAGER_BANDS))
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     with one_sentence():
@@ -268,18 +268,20 @@ def simulate(
         albedo=albedo,
         ocean_albedo=ocean_albedo,
         land_kernels=land_kernels,
-        ocean_wind=_number(ocean_wind),
-        land_albedo=_number(land_albedo),
-        sea_ice_albedo=_number(sea_ice_albedo),
-        snow_albedo=_number(snow_albedo),
+        ocean_wind=option_texts.number(ocean_wind),
+        land_albedo=option_texts.number(land_albedo),
+        sea_ice_albedo=option_texts.number(sea_ice_albedo),
+        snow_albedo=option_texts.number(snow_albedo),
         broadband=broadband,
-        emissivity=_number(emissivity),
+        emissivity=option_texts.number(emissivity),
         plume=plume,
         plume_species=plume_species,
         plume_aod=plume_aod,
         fires=fires,
-        gases=_names(gases, ALL_GASES),
-        hydrometeors=None if hydrometeors == _ALL else _names(hydrometeors, CLASSES),
+        gases=option_texts.names(gases, ALL_GASES),
+        hydrometeors=None
+        if hydrometeors == option_texts.ALL
+        else option_texts.names(hydrometeors, CLASSES),
         microphysics=microphysics,
         droplet_number=droplets,
         cloud_optics=cloud_optics,
@@ -301,34 +303,6 @@ def simulate(
         with output_folder(out, outdated=outdated, keeps_parts=True) as folder:
             report = simulate_scene(scene, folder)
         print_report(report, out, before)
-
-
-def _streams(text: str) -> float:
-    """An even number of streams, or the error that they may leave."""
-    try:
-        streams = float(text.removesuffix("%")) / 100 if text.endswith("%") else int(text)
-        most = most_streams(streams) if streams < 1 else streams
-    except ValueError as error:
-        word = str(error) if "streams" in str(error) else f"got {text}."
-        raise typer.BadParameter(f"streams are an even number or a percentage; {word}") from None
-    if not streams > 0 or most < 2 or most % 2:
-        raise typer.BadParameter(f"the number of streams is even, 2 or more; got {text}.")
-    return streams
-
-
-def _names(text: str, everything: tuple[str, ...]) -> tuple[str, ...]:
-    """Names that are separated by commas; all of them, or none."""
-    if text in (_ALL, _NONE):
-        return everything if text == _ALL else ()
-    return tuple(name.strip() for name in text.split(","))
-
-
-def _number(text: str | None) -> float | str | None:
-    """A number where the text is one."""
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        return text
 
 
 def print_report(report: Report, out: Path, before: list[str]) -> None:

@@ -13,7 +13,7 @@ FLOORS = [
     {"cli"},
     {"observe_command", "simulate_command"},
     {"guard", "sensitivity", "simulation"},
-    {"commands", "demo", "drawing", "report", "request"},
+    {"commands", "demo", "drawing", "option_texts", "report", "request"},
     {"scene"},
     {"files", "instrument", "pictures", "products"},
     {"quality", "radiance", "reflectance"},

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -77,6 +78,6 @@ def uneven(rng: np.random.Generator, num_pixels: int, spread: float) -> np.ndarr
 def as_retrieved(vector: StateVector, x: np.ndarray, covariance: np.ndarray) -> Reported:
     """Values of the quantities of a state vector as they are."""
     variance = np.diagonal(covariance, axis1=-2, axis2=-1)
-    values = vector.values(np.asarray(x))
-    sigma = np.asarray(vector.slopes(np.asarray(x))) * np.sqrt(variance)
+    values = vector.values(jnp.asarray(x))
+    sigma = np.asarray(vector.slopes(jnp.asarray(x))) * np.sqrt(variance)
     return np.stack([np.asarray(values[name]) for name in vector.names]), sigma.T
