@@ -38,7 +38,9 @@ CASES: dict[str, Callable[[], Case]] = {
     "fire": independent_fire,
 }
 """What is retrieved, by name."""
-S_OBS = ("noise", "noise and forward model")
+S_OBS = ("noise", "noise and forward model", "its mean taken out")
+"""What the inversion knows of: noise; the covariance above as well; instead of that the covariance
+about the mean of d, by which measurements are corrected."""
 
 
 class Found(NamedTuple):
@@ -72,7 +74,7 @@ def independent_truth(
 ) -> xr.Dataset:
     """Do the error bars of smoke, ash, dust, cloud and fires hold a truth by another model (more
     streams, other particles and heights, uneven pixels), without and with a forward-model
-    covariance in S_obs?
+    covariance in S_obs, and its mean?
 
     Parameters
     ----------
@@ -127,14 +129,20 @@ def _of_case(case: Case, num_pixels: int, seed: int, true_streams: int, num_stre
     model = ForwardModel(case.vector, case.bands, num_streams, gases=case.gases)
     forward = prepared(model, believed)
     relative = (seen / np.asarray(forward(x, believed)) - 1)[num_pixels:]
+    mean = relative.mean(axis=0)
     covariance = relative.T @ relative / num_pixels
+    known = (
+        (0.0, np.zeros_like(covariance)),
+        (0.0, covariance),
+        (mean, covariance - np.outer(mean, mean)),
+    )
 
     rng = np.random.default_rng([seed, 2])
     noise = measurement(seen, case.bands).sigma * rng.standard_normal(seen.shape)
     noisy, state = (seen + noise)[:num_pixels], scored.believed
     found = []
-    for error in (np.zeros_like(covariance), covariance):
-        observation = measurement(noisy, case.bands, forward_error=error)
+    for factor, error in known:
+        observation = measurement(noisy / (1 + factor), case.bands, forward_error=error)
         inversion = retrieve_pixels(forward, observation, state, prior=case.prior).inversion
         values, sigma = case.report(
             np.asarray(inversion.x), np.asarray(inversion.covariance), state
@@ -147,13 +155,13 @@ def _of_case(case: Case, num_pixels: int, seed: int, true_streams: int, num_stre
 
 def draw_independent_truth(table: xr.Dataset, figure: "Figure") -> None:
     """Of each quantity retrieved against true values with their errors, and the coverage."""
-    figure.set_size_inches(16, 3 * len(table["quantity"]))
-    axes = figure.subplots(len(table["quantity"]), 3, squeeze=False)
+    figure.set_size_inches(20, 3 * len(table["quantity"]))
+    axes = figure.subplots(len(table["quantity"]), 1 + len(table["S_obs"]), squeeze=False)
     probability = np.linspace(0.02, 0.98, 49)
     widths = scipy.stats.norm.ppf((1 + probability) / 2)
     for row, quantity in zip(axes, table["quantity"].values, strict=True):
         truth = table["truth"].sel(quantity=quantity).values
-        row[2].plot([0, 1], [0, 1], color="black", linewidth=1)
+        row[-1].plot([0, 1], [0, 1], color="black", linewidth=1)
         for panel, case in zip(row, table["S_obs"].values, strict=False):
             one = table.sel(quantity=quantity, S_obs=case)
             retrieved, sigma = one["retrieved"].values, one["sigma"].values
@@ -162,7 +170,7 @@ def draw_independent_truth(table: xr.Dataset, figure: "Figure") -> None:
             panel.set(xlabel=f"true {quantity}", ylabel="retrieved")
             panel.set_title(f"S_obs of {case}: bias {float(one['bias']):.3f}")
             ratio = np.abs(retrieved - truth) / sigma
-            row[2].plot(probability, [np.nanmean(ratio <= w) for w in widths], label=case)
-        row[2].set(xlabel="probability of the interval", ylabel="share of truths inside")
-        row[2].set_title(quantity)
-        row[2].legend()
+            row[-1].plot(probability, [np.nanmean(ratio <= w) for w in widths], label=case)
+        row[-1].set(xlabel="probability of the interval", ylabel="share of truths inside")
+        row[-1].set_title(quantity)
+        row[-1].legend()
