@@ -1,6 +1,6 @@
 """What so many streams leave of the error, by what is in a column: the table of `scene.streams`.
 
-    python benchmarks/fit_streams.py [--columns 1000] [--seeds 4]
+    python benchmarks/fit_streams.py [--columns 500] [--seeds 2]
 
 Columns are those of `truth_columns`, of seeds that `truth.py` does not use, in seven bands, against
 64 streams with 65 moments and 32 azimuth modes. Printed is the 99th percentile of the error by
@@ -25,8 +25,8 @@ FIRST_SEED = 100
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--columns", type=int, default=1000)
-    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--columns", type=int, default=500)
+    parser.add_argument("--seeds", type=int, default=2)
     options = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
     use_compilation_cache()

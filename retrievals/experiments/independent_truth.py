@@ -155,6 +155,7 @@ def _of_case(case: Case, num_pixels: int, seed: int, true_streams: int, num_stre
 
 def draw_independent_truth(table: xr.Dataset, figure: "Figure") -> None:
     """Of each quantity retrieved against true values with their errors, and the coverage."""
+    figure.set_layout_engine("constrained")
     figure.set_size_inches(20, 3 * len(table["quantity"]))
     axes = figure.subplots(len(table["quantity"]), 1 + len(table["S_obs"]), squeeze=False)
     probability = np.linspace(0.02, 0.98, 49)
@@ -168,7 +169,7 @@ def draw_independent_truth(table: xr.Dataset, figure: "Figure") -> None:
             panel.errorbar(truth, retrieved, sigma, fmt=".", markersize=3, linewidth=0.6)
             panel.plot(*[[truth.min(), truth.max()]] * 2, color="black", linewidth=1)
             panel.set(xlabel=f"true {quantity}", ylabel="retrieved")
-            panel.set_title(f"S_obs of {case}: bias {float(one['bias']):.3f}")
+            panel.set_title(f"{case}: bias {float(one['bias']):.3f}")
             ratio = np.abs(retrieved - truth) / sigma
             row[-1].plot(probability, [np.nanmean(ratio <= w) for w in widths], label=case)
         row[-1].set(xlabel="probability of the interval", ylabel="share of truths inside")
