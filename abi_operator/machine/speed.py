@@ -131,6 +131,7 @@ def use_compilation_cache(folder: str | os.PathLike[str] | None = None) -> Path 
     """
     if not jax.config.jax_enable_compilation_cache:  # pyright: ignore[reportAttributeAccessIssue]
         return None
+    warnings.filterwarnings("ignore", _HALF_WRITTEN, UserWarning)
     chosen = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
     if chosen and (folder is None or "JAX_COMPILATION_CACHE_DIR" in os.environ):
         return Path(chosen)
@@ -149,7 +150,6 @@ def use_compilation_cache(folder: str | os.PathLike[str] | None = None) -> Path 
     if "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS" not in os.environ:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_compilation_cache_dir", str(place))
-    warnings.filterwarnings("ignore", _HALF_WRITTEN, UserWarning)
     reset_cache()
     return place
 
