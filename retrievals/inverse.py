@@ -57,9 +57,8 @@ class Minimiser(NamedTuple):
     max_starts
         Of a scan: how often a pixel may begin whose fit is poor, or that has no more measurements
         than unknowns and may have several solutions. Of 10,000 random pixels of smoke, three
-        unknowns from three bands, 4 explained 99.86 %, 8 99.97 %, and 98 % of those whose first
-        solution was not the truth are told to have another
-        (`benchmarks/retrievals_against_truth.py`).
+        unknowns from three bands, 8 explain 99.97 %, and 98 % of those whose first solution is not
+        the truth are told to have another (`benchmarks/retrievals_against_truth.py`).
     coarse_to_fine
         Whether with a prior the scan and the first steps are by fewer streams (`coarse_to_fine`);
         not where the tolerance is below 1e-2.

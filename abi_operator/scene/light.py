@@ -122,10 +122,10 @@ def _of_sunlight(
     values = np.full((len(flags), len(bands)), np.nan)
     index = np.array([bands.index(band) for band in solar], int)
     for number in np.unique(streams[solved]) if solar else ():
-        alike = np.flatnonzero(solved & (streams == number))
-        for chosen, some in by_kind(jax.tree.map(lambda x, rows=alike: x[rows], states)):
+        alike = solved & (streams == number)
+        for chosen, some in by_kind(_some(states, alike)):
             found = brf(some, solar, num_streams=int(number), **settings)
-            values[np.ix_(alike[chosen], index)] = found
+            values[np.ix_(np.flatnonzero(alike)[chosen], index)] = found
     factor = np.cos(states.geometry.solar_zenith)[:, None] * values
     in_sight = (flags & QUALITY_FLAGS["out_of_sight"]) == 0
     night = ((flags & QUALITY_FLAGS["night"]) > 0) & in_sight

@@ -1,9 +1,9 @@
 """How many streams columns need for a stated error, by what is in them.
 
-What few streams leave is no function of depth, truncation, angles and albedo that could be written
-down: fitted to those, the errors of columns scatter by a factor of 4.5. So the rule is one of kinds
-of columns, and its numbers are measured: the error within which 99 of 100 columns and bands of a
-kind are, of the columns of `benchmarks/truth.py` (`benchmarks/fit_streams.py`).
+What few streams leave depends on depth, truncation, angles and albedo in no way that could be
+written down. So the rule is one of kinds of columns, and its numbers are measured: the error within
+which 99 of 100 columns and bands of a kind are, of columns made as those of `benchmarks/truth.py`
+(`benchmarks/fit_streams.py`).
 """
 
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from ..atmosphere import Atmosphere
 
 KINDS = ("air", "plume", "cloud")
-"""Of columns: neither plume nor cloud; a plume, but no cloud; cloud of water or ice, or what falls
-from it."""
+"""Of columns: neither aerosol nor cloud; a plume or aerosol beside it, but no cloud; cloud of water
+or ice, or what falls from it."""
 STREAMS = (8, 10, 12, 16, 24)
 """Numbers of streams to choose from. [-]"""
 ERRORS = {
@@ -32,8 +32,9 @@ def kinds_of(atmosphere: Atmosphere) -> np.ndarray:
     path, aod = np.zeros(count), np.zeros(count)
     for matter in (atmosphere.liquid, *atmosphere.hydrometeors.values()):
         path += np.sum(np.asarray(matter.mass_path), axis=-1)
-    for plume in atmosphere.plumes.values():
-        aod += np.asarray(plume.aod_550)
+    everywhere = () if atmosphere.background is None else (atmosphere.background,)
+    for aerosol in (*atmosphere.plumes.values(), *everywhere):
+        aod += np.asarray(aerosol.aod_550)
     kinds = np.where(aod >= LEAST_AOD, "plume", "air")
     return np.where(path >= LEAST_PATH, "cloud", kinds)
 

@@ -75,8 +75,10 @@ def uneven(rng: np.random.Generator, num_pixels: int, spread: float) -> np.ndarr
     return factors / factors.mean(axis=1, keepdims=True)
 
 
-def as_retrieved(vector: StateVector, x: np.ndarray, covariance: np.ndarray) -> Reported:
-    """Values of the quantities of a state vector as they are."""
+def as_retrieved(
+    vector: StateVector, x: np.ndarray, covariance: np.ndarray, believed: State
+) -> Reported:
+    """A `Case.report` of the quantities of a state vector as they are; the state adds nothing."""
     variance = np.diagonal(covariance, axis1=-2, axis2=-1)
     values = vector.values(jnp.asarray(x))
     sigma = np.asarray(vector.slopes(jnp.asarray(x))) * np.sqrt(variance)

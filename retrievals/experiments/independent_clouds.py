@@ -26,7 +26,6 @@ from .independent_case import (
     UNEVEN_GROUND,
     Case,
     Drawn,
-    Reported,
     as_retrieved,
     uneven,
 )
@@ -52,7 +51,7 @@ def independent_cloud() -> Case:
         Prior(np.asarray(vector.x(*MEAN)), np.diag(np.square(SIGMAS))),
         ("cloud optical thickness", "cloud effective radius [um]"),
         partial(_drawn, vector),
-        partial(_reported, vector),
+        partial(as_retrieved, vector),
     )
 
 
@@ -96,9 +95,3 @@ def _cloud(
     radius_of_one = float(effective_radius(one)[0]) / _MICRON
     number = mass * _DROPS * (radius_of_one / size) ** 3
     return LiquidCloud(jnp.asarray(mass), jnp.asarray(number))
-
-
-def _reported(
-    vector: StateVector, x: np.ndarray, covariance: np.ndarray, believed: State
-) -> Reported:
-    return as_retrieved(vector, x, covariance)

@@ -21,7 +21,7 @@ from ..declarations import fire
 from ..prior import Prior
 from ..state_vector import StateVector
 from . import scenes
-from .independent_case import STRIPS, UNEVEN_GROUND, Case, Drawn, Reported, as_retrieved, uneven
+from .independent_case import STRIPS, UNEVEN_GROUND, Case, Drawn, as_retrieved, uneven
 
 MEAN, SIGMAS = (800.0, 1e-3), (0.4, 0.4)
 """Of the prior: temperature [K] and burning share [-], and of x. [-]"""
@@ -43,7 +43,7 @@ def independent_fire() -> Case:
         Prior(np.asarray(vector.x(*MEAN)), np.diag(np.square(SIGMAS))),
         ("fire temperature [K]", "fire fraction"),
         partial(_drawn, vector),
-        partial(_reported, vector),
+        partial(as_retrieved, vector),
     )
 
 
@@ -84,9 +84,3 @@ def _air(num_pixels: int, moisture: float) -> Atmosphere:
     air = standard_atmosphere(_ATMOSPHERE, _LEVELS)
     air = eqx.tree_at(lambda a: a.gases.vapour, air, replace_fn=lambda vapour: vapour * moisture)
     return jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (num_pixels, *jnp.shape(leaf))), air)
-
-
-def _reported(
-    vector: StateVector, x: np.ndarray, covariance: np.ndarray, believed: State
-) -> Reported:
-    return as_retrieved(vector, x, covariance)

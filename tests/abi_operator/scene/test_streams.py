@@ -7,6 +7,7 @@ from abi_operator import smoke
 from abi_operator.scene import PlumeSpecification, column_states, scenario, simulate
 from abi_operator.scene import streams as rule
 from abi_operator.scene.streams import ERRORS, KINDS, STREAMS, kinds_of, most_streams, streams_of
+from retrievals.images import solved_whole
 
 BANDS = ("C01", "C03")
 
@@ -23,6 +24,12 @@ def made(make_model):
 def test_columns_are_of_the_kind_of_what_is_in_them(made):
     kinds = kinds_of(column_states(made, BANDS).atmosphere).reshape(3, 2)
     assert (kinds[:, 0] == "cloud").all() and kinds[:, 1].tolist() == ["air", "plume", "plume"]
+
+
+def test_aerosol_beside_plumes_counts_as_one(make_model):
+    hazy = scenario(make_model(land_mask=None), ocean_albedo=0.06, background_aerosol=0.1)
+    kinds = kinds_of(column_states(hazy, BANDS).atmosphere)
+    assert set(kinds) == {"cloud", "plume"}
 
 
 def test_fewer_errors_take_more_streams(made):
@@ -48,6 +55,7 @@ def test_each_kind_is_solved_by_its_own_number(made, monkeypatch):
     monkeypatch.setattr(rule, "ERRORS", {"air": (0.1,), "plume": (0.1,), "cloud": (0.5, 0.1)})
     found = simulate(made, num_streams=0.1, error_budget=None)
     assert found.attrs["num_streams"] == 4 and found.attrs["streams_error"] == 0.1
+    assert not solved_whole(found) and solved_whole(found.drop_attrs())
     few, many = (simulate(made, num_streams=n, error_budget=None)["brf"] for n in (2, 4))
     assert "streams_error" not in simulate(made, num_streams=2).attrs
     assert (abs(many / few - 1) > 1e-6).all()
