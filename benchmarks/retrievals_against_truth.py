@@ -1,6 +1,7 @@
 """Retrievals against the known truth: closure and calibration.
 
     python benchmarks/retrievals_against_truth.py [--pixels 512] [--streams 8] [--only NAMES]
+                                                  [--rows 1 2 3 4 5 6]
 
 Random pixels of `benchmarks/retrievals_pixels.py`: clear air of 20 layers, everything a pixel's own
 (sun to 75 degrees, view to 70, albedo 0.01 to 0.4 in every band). Float64. Names are closure, fire
@@ -23,6 +24,7 @@ and calibration; without any all run, in some five minutes for 1,024 pixels on t
 
 import argparse
 import time
+from functools import partial
 from itertools import pairwise
 
 import jax
@@ -76,13 +78,13 @@ CLOSURES = (
 """Species, whether ssa and effective radius are unknown beside optical depth, and bands."""
 
 
-def closure(num_pixels, streams):
+def closure(num_pixels, streams, chosen):
     heads = ("retrieved", "bands", "blind", "aod, first", "aod, either", "brf 1e-9", "second roots")
     heads += ("coded so", "steps", SECONDS)
     print(f"\nshares of {num_pixels} pixels [%]:\n\n| {' | '.join(heads)} |")
     print(f"|{' --- |' * len(heads)}")
     roots = {}
-    for species, ssa, radius, bands in CLOSURES:
+    for species, ssa, radius, bands in [CLOSURES[k - 1] for k in chosen]:
         rng = np.random.default_rng(7)
         states = random_states(rng, num_pixels, bands, species)
         vector = plume(species, ssa=ssa, effective_radius=radius)
@@ -200,12 +202,14 @@ def main():
     parser.add_argument("--pixels", type=int, default=512)
     parser.add_argument("--streams", type=int, default=8)
     parser.add_argument("--only", default="closure,fire,calibration")
+    numbers = range(1, len(CLOSURES) + 1)
+    parser.add_argument("--rows", type=int, nargs="+", choices=numbers, help="of the closure")
     arguments = parser.parse_args()
     use_compiler_flags()
     use_compilation_cache()
     jax.config.update("jax_enable_x64", True)
     studies = {
-        "closure": closure,
+        "closure": partial(closure, chosen=arguments.rows or numbers),
         "fire": fire_closure,
         "calibration": calibration,
     }

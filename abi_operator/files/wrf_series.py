@@ -87,9 +87,9 @@ class WrfSeries(NamedTuple):
                 )
             return [int(text)]
         try:
-            moment = np.datetime64(text.replace("_", "T").removesuffix("Z"))
-            if np.isnat(moment):
+            if text.lower() in ("", "nat"):  # NumPy's own names of no time
                 raise ValueError
+            moment = np.datetime64(text.replace("_", "T").removesuffix("Z"))
         except ValueError:
             raise InputError(
                 f"{text!r} is no time; write it as 2005-08-28T12:00, or as a number from 0."

@@ -6,6 +6,7 @@ which is what a CPU is fast at when matrices are small.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import wraps
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
 from jaxtyping import Array, Float, Int
 
+from .backend import on_cpu
 from .plain import is_plain
 
 _WRITTEN_OUT = 16  # longest sum of a matrix product that is written out
@@ -40,7 +42,7 @@ def fenced(function: Callable) -> Callable:
     layer several times slower. A call that is not inlined stops it, and derivatives and `vmap`
     pass through; `jax.lax.optimization_barrier` is dropped before fusion on the CPU. Every
     `jax.jit` inside becomes such a call, too, also those in JAX's own functions. An `Entry` among
-    the arguments reaches `function` as an array.
+    the arguments reaches `function` as an array. Other devices have no fences (`backend`).
     """
     reading = _reading(function)
     compiled = jax.jit(reading)
@@ -53,7 +55,7 @@ def fenced(function: Callable) -> Callable:
         arrays = [x for x in jax.tree.leaves(args) if not isinstance(x, float)]
         dtype = jnp.result_type(*(x for x in arrays if jnp.issubdtype(x.dtype, jnp.floating)))
         args = jax.tree.map(lambda x: jnp.asarray(x, dtype) if isinstance(x, float) else x, args)
-        with set_xla_metadata(inlineable="false"):
+        with set_xla_metadata(inlineable="false") if on_cpu() else nullcontext():
             return compiled(*args)
 
     return call

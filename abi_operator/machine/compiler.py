@@ -9,11 +9,14 @@ with the same under
     XLA_FLAGS="--xla_cpu_use_fusion_emitters=true --xla_backend_extra_options=xla_none=false"
 
 The last is no option of `jax.jit`: programs that are called with values do without it, and a
-process of its own has it in ``XLA_FLAGS`` (`speed`).
+process of its own has it in ``XLA_FLAGS`` (`speed`). JAX 0.11 has the newer way alone.
 """
 
 import os
 import re
+from functools import cache
+
+import jax
 
 from .processor import vector_bits
 
@@ -34,7 +37,21 @@ def options() -> dict[str, int | bool]:
     bits = vector_bits()
     if bits is not None:
         found[_WIDTH] = bits
-    return {name: value for name, value in found.items() if not _is_chosen(name)}
+    return {k: x for k, x in found.items() if not _is_chosen(k) and _is_known(k, x)}
+
+
+@cache
+def _is_known(name: str, value: int | bool) -> bool:
+    """Whether this XLA has an option: asked by a program of nothing, as each version knows others.
+
+    One that it does not know would end every call.
+    """
+    program = jax.jit(lambda x: x, compiler_options={name: value})
+    try:
+        program.lower(0.0).compile()
+    except jax.errors.JaxRuntimeError:
+        return False
+    return True
 
 
 def use_flags() -> None:

@@ -2,7 +2,7 @@
 
 To start a kernel takes a CPU as long as the arithmetic of 2 x 2 or 4 x 4 matrices on a tile of
 columns, and a layer has a hundred kernels. XLA compiles a call marked ``xla_cpu_small_call`` whole,
-loops included, as it does the smallest loops of any program; other backends do not know the mark.
+loops included, as it does the smallest loops of any program; other backends are not given the mark.
 
 The call is a primitive of its own, because a `jax.jit` is taken apart where derivatives are: into
 what is known and what is not, piece by piece, of which XLA then makes no kernel.
@@ -110,9 +110,13 @@ def _abstract_eval(*_: Any, jaxpr: ClosedJaxpr, small: bool) -> Any:
     return jaxpr.out_avals
 
 
+def _unmarked(*leaves: Any, jaxpr: ClosedJaxpr, small: bool) -> Any:
+    return jaxpr_as_fun(jaxpr)(*leaves)
+
+
 def _marked(*leaves: Any, jaxpr: ClosedJaxpr, small: bool) -> Any:
     if not small:
-        return jaxpr_as_fun(jaxpr)(*leaves)
+        return _unmarked(*leaves, jaxpr=jaxpr, small=small)
     compiled = jax.jit(jaxpr_as_fun(jaxpr))
     with set_xla_metadata(inlineable="false", xla_cpu_small_call="true"):
         return compiled(*leaves)
@@ -131,6 +135,7 @@ def _batch(leaves: Any, axes: Any, *, jaxpr: ClosedJaxpr, small: bool) -> Any:
     return mapped, [0] * len(mapped)
 
 
-mlir.register_lowering(_one_kernel, mlir.lower_fun(_marked, multiple_results=True))
+mlir.register_lowering(_one_kernel, mlir.lower_fun(_unmarked, multiple_results=True))
+mlir.register_lowering(_one_kernel, mlir.lower_fun(_marked, multiple_results=True), platform="cpu")
 ad.primitive_jvps[_one_kernel] = _jvp
 batching.primitive_batchers[_one_kernel] = _batch

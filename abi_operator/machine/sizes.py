@@ -1,10 +1,11 @@
-"""How many columns are taken together: on a CPU as many as suit its cache, elsewhere 4,096.
+"""How many columns are taken together: on a CPU as many as suit its cache, elsewhere thousands.
 
 A tile is what a program solves at once, in a loop over tiles; a chunk is what a program is called
 with, so that it is compiled for a few sizes whatever comes. On a CPU the fewer, the more of a layer
 is in the cache next to the processor; the more, the less the start of a kernel counts
 (`benchmarks/layout.py` measures both). Another device has no cache to keep a tile in, but many
-units to fill: there the number bounds memory alone.
+units to fill and a time to start each kernel: there the more the better, and memory bounds the
+number (`benchmarks/devices.py --tile` measures it).
 
 These are functions, and asked as columns come: which devices there are is settled when JAX is first
 used, and not when this package is imported.
@@ -12,19 +13,21 @@ used, and not when this package is imported.
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
+
+from .backend import on_cpu
 
 VECTOR = 8
 """Numbers in double precision that a vector unit holds at most; tiles narrower than a few of these
 leave it idle."""
 
-# What another device than a CPU takes, of whatever is taken together.
-_ELSEWHERE = 4096
+# What another device than a CPU takes, of whatever is taken together, and of the solver's columns
+# up to 16 streams: there 16,384 take half the time a column that 4,096 take, and more save little.
+_ELSEWHERE, _SOLVER_ELSEWHERE = 4096, 16384
 # Tiles of a chunk of columns that are sorted.
 _SORTED_TILES = 32
 # Columns of the solver in a tile of states, in tiles of the solver: its own loop is inside.
-_SOLVER_TILES = 8
+_SOLVER_TILES, _SOLVER_TILES_ELSEWHERE = 8, 2
 
 
 def tile_size(num_streams: int, dtype: Any) -> int:
@@ -34,8 +37,8 @@ def tile_size(num_streams: int, dtype: Any) -> int:
     (`algebra.weighted_rows` has what was done about it). Where a layer is one kernel (`kernels`) a
     tile is also small enough for that.
     """
-    if not _on_cpu():
-        return _ELSEWHERE
+    if not on_cpu():
+        return _SOLVER_ELSEWHERE if num_streams <= 16 else _ELSEWHERE
     single = jnp.dtype(dtype) == jnp.float32
     if num_streams > 16:
         return 64 if single else 32
@@ -45,12 +48,13 @@ def tile_size(num_streams: int, dtype: Any) -> int:
 def tile_of_states(columns: int, num_streams: int, dtype: Any) -> int:
     """States of which each is so many columns of the solver that are solved at once, at most."""
     tile = tile_size(num_streams, dtype)
-    return VECTOR * max(1, _SOLVER_TILES * tile // columns // VECTOR)
+    tiles = _SOLVER_TILES if on_cpu() else _SOLVER_TILES_ELSEWHERE
+    return VECTOR * max(1, tiles * tile // columns // VECTOR)
 
 
 def tile_of_grounds() -> int:
     """Columns whose grounds are looked at at once, each from some 2000 views."""
-    return 64 if _on_cpu() else _ELSEWHERE
+    return 64 if on_cpu() else _ELSEWHERE
 
 
 def chunks_of_columns(num_streams: int, dtype: Any, in_order: bool = False) -> tuple[int, ...]:
@@ -73,7 +77,7 @@ def chunks_of_states(tile: int) -> tuple[int, ...]:
 
 def chunks_to_read() -> tuple[int, ...]:
     """Numbers of columns whose optics alone are taken together, rising."""
-    return 64, 1024 if _on_cpu() else _ELSEWHERE
+    return 64, 1024 if on_cpu() else _ELSEWHERE
 
 
 def chunk_of_pixels() -> int:
@@ -83,13 +87,9 @@ def chunk_of_pixels() -> int:
     columns leave the cache. 196 pixels of three bands took 3.1, 3.5, 3.8 and 4.8 s on two cores in
     chunks of 16, 32, 48 and 96.
     """
-    return 16 if _on_cpu() else _ELSEWHERE
+    return 16 if on_cpu() else _ELSEWHERE
 
 
 def chunk_of_pixels_to_read() -> int:
     """Pixels whose thickest layers are looked for together."""
-    return 256 if _on_cpu() else _ELSEWHERE
-
-
-def _on_cpu() -> bool:
-    return jax.default_backend() == "cpu"
+    return 256 if on_cpu() else _ELSEWHERE

@@ -1,0 +1,25 @@
+"""Options of the compiler: those that this version of XLA has, and that nobody has chosen."""
+
+import pytest
+
+from abi_operator.machine import compiler
+
+
+@pytest.fixture
+def without_flags(monkeypatch):
+    monkeypatch.delenv("XLA_FLAGS", raising=False)
+
+
+def test_an_option_that_xla_does_not_know_is_left_out(monkeypatch, without_flags):
+    """Versions add and drop options, and a call with one that is not there fails."""
+    known = compiler.options()
+    monkeypatch.setattr(compiler, "_EMITTERS", "xla_cpu_no_such_option")
+    found = compiler.options()
+    assert "xla_cpu_no_such_option" not in found
+    assert found.items() <= known.items()
+
+
+def test_what_the_user_has_chosen_stays(monkeypatch, without_flags):
+    (name, *_) = compiler.options()
+    monkeypatch.setenv("XLA_FLAGS", f"--{name}=true")
+    assert name not in compiler.options()
