@@ -30,8 +30,8 @@ STREAMS = {
     "W3": {1e-2: (4, 9e-3), 1e-3: (4, 6e-4)},
     "W4": {1e-2: (10, 3e-3), 1e-3: (20, 4e-4)},
 }
-TRUE_STREAMS, PEAKED_STREAMS = 64, 128
-PEAKED = 1.0  # (2l + 1) chi_l at the 64th moment, of a layer that scatters, from which 128 are used
+TRUE_STREAMS = 64
+PEAKED = 1.0  # (2l + 1) chi_l at the 64th moment, of a layer that scatters: a peak
 DARK = 0.01  # errors are relative to brf, or to this where brf is less
 
 
@@ -101,17 +101,17 @@ def options_of(workload, budget, skipping) -> dict[str, Any]:
     return options | {"error_budget": spent} if skipping and any(CAN_SKIP) else options
 
 
-def truth(columns: Columns, emission=True):
-    """brf by 64 streams, or 128 where a phase function is peaked: every layer and every mode."""
+def truth(columns: Columns, emission=True, num_streams=TRUE_STREAMS):
+    """brf by 64 streams: every layer and every mode."""
+    parts = parts_of(columns, num_streams, emission)
+    return as_brf(parts, value(parts, {"num_streams": num_streams}))
+
+
+def peaked(columns: Columns):
+    """Whether 64 streams leave a part of a column's phase functions to delta-M."""
     last = columns.moments(TRUE_STREAMS + 1)[..., -1]
     scatters = columns.tau * columns.ssa > 1e-4
-    peaked = ((2 * TRUE_STREAMS + 1) * last * scatters).max(axis=1) > PEAKED
-    brf = np.empty(columns.count)
-    for some, num_streams in ((~peaked, TRUE_STREAMS), (peaked, PEAKED_STREAMS)):
-        if some.any():
-            parts = parts_of(columns.rows(some), num_streams, emission)
-            brf[some] = as_brf(parts, value(parts, {"num_streams": num_streams}))
-    return brf
+    return ((2 * TRUE_STREAMS + 1) * last * scatters).max(axis=1) > PEAKED
 
 
 def relative_error(brf, true_brf):

@@ -16,7 +16,7 @@ import workload
 from peers import Peers, peak_memory, usable_peers
 from rounds import AGREE, Program, Rounds, apart, digits, table
 
-BATCHES = (1, 10, 100, 1000, 10_000, 100_000)
+BATCHES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000)
 LAYERS = (1, 2, 5, 10, 20, 40, 60)
 STREAMS = (2, 4, 6, 8, 12, 16, 24, 32)
 USUAL_STREAMS = (8, 16)
