@@ -9,6 +9,7 @@ them, unless the layer lets no light through anyway. A program for values alone 
 as it needs, whoever can read it (`solver.method.doublings`).
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
@@ -20,6 +21,7 @@ from .band_columns import HARMLESS_ZENITH, columns_of_bands
 from .bands_of_states import Inputs, Options, of_tile, tile_size, with_slopes
 from .machine.door import Leaves, enter
 from .machine.sizes import chunks_of_states, chunks_to_read
+from .plume_edges import with_plume_edges
 from .solver import sufficient_doublings
 
 
@@ -32,10 +34,18 @@ def solve(inputs: Inputs, options: Options) -> Float[Array, "*batch band"]:
         What the columns are and how to solve them. Without a number of doublings there is no limit
         to those of values (see above).
     """
+    if options.settings.plume_edges:
+        edged = replace(inputs.state, atmosphere=_edged(inputs.state.atmosphere))
+        inputs = inputs._replace(state=edged)
+    # The program is of levels, whoever made them.
+    options = options._replace(settings=options.settings._replace(plume_edges=None))
     leaves, structure = jax.tree.flatten(inputs)
     num_axes = inputs.state.geometry.solar_zenith.ndim
     own_axes = tuple(x.ndim - num_axes for x in leaves)
     return enter(_Program(structure, options, own_axes), leaves)
+
+
+_edged = jax.jit(with_plume_edges)
 
 
 class _Program(NamedTuple):

@@ -23,6 +23,11 @@ class Settings(NamedTuple):
     error_budget
         Relative error of the reflectance that may be made for speed on top of what the streams
         leave, such as 1e-3; see `solver.Settings`. None solves everything.
+    plume_edges
+        Whether columns are solved on levels that go with the edges of their plumes
+        (`with_plume_edges`), so that slopes in base and top of a plume are smooth. Else, with None
+        as well, a plume is spread over all of the layers that its edges lie in: such slopes then
+        change in steps from layer to layer.
     """
 
     satellite: str = "GOES-16"
@@ -31,6 +36,7 @@ class Settings(NamedTuple):
     num_modes: int | None = None
     num_doublings: int | None = None
     error_budget: float | None = None
+    plume_edges: bool | None = None
 
 
 class ByName(TypedDict, total=False):
@@ -42,6 +48,7 @@ class ByName(TypedDict, total=False):
     num_modes: int | None
     num_doublings: int | None
     error_budget: float | None
+    plume_edges: bool | None
 
 
 def settings_of(given: ByName) -> Settings:

@@ -23,6 +23,7 @@ CORRECTED = ("nanodisort", "disortpp")  # those that have the correction, and en
 PLAIN = (*CORRECTED, "sasktran2")
 ONE_GEOMETRY = 0.6, 0.65, 1.6  # cosines of sun and view, azimuth [rad], for all columns
 LONGEST_SERIES = 385  # moments
+CUT = 1e-9  # last moment of series that are cut off
 SERIES_END = 1e-3  # (2l + 1) chi_l of the last moment of a series
 SAME = 1e-12  # optics of two layers that are one
 SEARCH_SECONDS = 5.0  # of a call of the search at most, roughly
@@ -70,10 +71,24 @@ def series_length(columns: Sequence[Columns]):
     return int(min(needed, LONGEST_SERIES))
 
 
+def scaled(tau, ssa, moments):
+    """Layers of which what the series does not reach goes on: delta-M at the last moment.
+
+    The correction sums the series, and one that is cut off far from its end, as those of drops and
+    crystals are, swings about the phase function by more than that. Delta-M at fewer moments, as a
+    solver does it, gives the same afterwards as before.
+    """
+    f = moments[..., -1]
+    if f.max() < CUT:
+        return tau, ssa, moments[..., :-1]
+    kept = 1 - ssa * f
+    return kept * tau, (1 - f) * ssa / kept, (moments[..., :-1] - f[..., None]) / (1 - f)[..., None]
+
+
 def arrays_of(columns: Columns, num_moments):
     """Columns by the names of `peers.AXES`, with temperatures where they emit."""
-    arrays = (columns.tau, columns.ssa, columns.moments(num_moments), columns.albedo)
-    arrays += (columns.mu0, columns.mu, columns.relative_azimuth)
+    arrays = scaled(columns.tau, columns.ssa, columns.moments(num_moments + 1))
+    arrays += (columns.albedo, columns.mu0, columns.mu, columns.relative_azimuth)
     found = dict(zip(AXES, arrays, strict=True))
     if columns.planck_levels is not None:
         # The ground of the peers emits 1 - albedo of a black one.

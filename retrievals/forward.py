@@ -43,6 +43,9 @@ class ForwardModel:
     error_budget
         Relative error that the solver may make for speed; see `abi_operator.brf`. None for no
         error, as a fit that is to be exact needs it. [-]
+    plume_edges
+        Whether levels go with the edges of plumes; see `abi_operator.brf`. None leaves it to
+        `prepared`, which has them where x moves the base or the top of a plume.
     """
 
     vector: StateVector
@@ -52,6 +55,7 @@ class ForwardModel:
     gases: tuple[str, ...] = ALL_GASES
     satellite: str = "GOES-16"
     error_budget: float | None = None
+    plume_edges: bool | None = None
 
     def state(self, x: Float[Array, "*batch x"], state: State) -> State:
         """Put x into a state."""
@@ -87,6 +91,7 @@ class ForwardModel:
             "num_doublings": self.num_doublings,
             "satellite": self.satellite,
             "error_budget": self.error_budget,
+            "plume_edges": self.plume_edges,
         }
         if THERMAL not in self.bands and full.fire is None:
             return reflectance_factor(full, self.bands, **settings)
@@ -102,7 +107,7 @@ class ForwardModel:
 
 
 def prepared(forward: ForwardModel, states: State) -> ForwardModel:
-    """Give a forward model doublings that suffice for every x.
+    """Give a forward model doublings that suffice for every x, and levels that go with plumes.
 
     Parameters
     ----------
@@ -116,7 +121,10 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
     cosines = (np.cos(x) for x in (states.geometry.solar_zenith, states.geometry.view_zenith))
     min_mu = min(np.min(np.where(x > 0, x, 1.0)) for x in cosines)  # below the horizon: none
     num_doublings = sufficient_doublings(float(max_tau), float(min_mu), forward.num_streams)
-    return replace(forward, num_doublings=num_doublings)
+    edges = forward.plume_edges
+    if edges is None and forward.vector.moves_plumes(states):
+        edges = True
+    return replace(forward, num_doublings=num_doublings, plume_edges=edges)
 
 
 @Kept

@@ -25,6 +25,7 @@ References
    doi:10.1142/3171
 """
 
+from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
@@ -103,7 +104,8 @@ def estimates(
     x
         Its solutions. [-]
     assumed
-        What is not retrieved, with the covariance of its declarations; None for nothing.
+        What is not retrieved, with the covariance of its declarations; None for nothing. Where it
+        moves a plume, levels go with its edges unless the forward model says otherwise.
 
     Returns
     -------
@@ -115,6 +117,8 @@ def estimates(
     if prior is not None:
         prior = prior.of_pixels(len(x), forward.vector.names)
     about = None if assumed is None else assumed.prior(states).of_pixels(len(x), assumed.names)
+    if assumed is not None and forward.plume_edges is None and assumed.moves_plumes(states):
+        forward = replace(forward, plume_edges=True)
     rows = (prior, about, observations, states)
     rows = jax.tree.map(np.asarray, rows)
     return map_chunks(lambda *chunk: _estimate_chunk((forward, assumed), *chunk), *rows, x)

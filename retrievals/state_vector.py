@@ -91,6 +91,17 @@ class StateVector:
             state = with_part(state, quantity.place, quantity.put(node, value))
         return state
 
+    def moves_plumes(self, states: State) -> bool:
+        """Whether x moves the base or the top of a plume of such columns."""
+        first = jax.tree.map(lambda leaf: leaf[:1], states)
+
+        def edges(x: Float[Array, " x"]) -> list[Array]:
+            plumes = self.state(x[None], first).atmosphere.plumes
+            return [edge for plume in plumes.values() for edge in (plume.base, plume.top)]
+
+        slopes = jax.jacfwd(edges)(jnp.full(self.size, 0.1))
+        return any(bool(np.any(np.asarray(slope))) for slope in slopes)
+
     def held(self, state: State, name: str) -> Array:
         """Value of a quantity that a state holds itself: the truth, or what is thought of it.
 

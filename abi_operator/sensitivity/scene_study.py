@@ -27,6 +27,7 @@ some 1e-4 of sunlight in C06. [K]"""
 DEFAULT_FIRE = Fire(0.04, 800.0)  # pyright: ignore[reportArgumentType]
 """One cell of 400 m in a pixel of 2 km."""
 
+_OF_EDGES = "plume_height", ".base", ".top"  # how names of inputs end that move a plume's edges
 _DARK = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 
 
@@ -62,6 +63,8 @@ def sensitivity_study(
     sampling: Sampling | None = None,
 ) -> xr.Dataset:
     """Sensitivities of a scene's image to what is in the scene, in float64.
+
+    Where an edge of a plume is changed, columns have levels that go with it (`with_plume_edges`).
 
     Parameters
     ----------
@@ -113,7 +116,10 @@ def sensitivity_study(
             covariance = covariance_of(inputs, correlations)
             chosen = chosen_pixels(image, species, where)
             states = states_of(image, chosen, of, fire)
-            function = output_function(of, settings_of_result(image), sun_distance_of(image))
+            how = settings_of_result(image)
+            if any(one.name.endswith(_OF_EDGES) for one in inputs):
+                how = how._replace(plume_edges=True)
+            function = output_function(of, how, sun_distance_of(image))
             found = sensitivity(function, states, inputs, second_order=second_order)
             sampled = _sampled(function, states, inputs, found, covariance, sampling or Sampling())
     except ValueError as error:

@@ -20,6 +20,7 @@ from .plumes import WithEffectiveRadius as WithEffectiveRadius
 from .plumes import aod_550 as aod_550
 from .plumes import assumed_of_plume as assumed_of_plume
 from .plumes import effective_radius_um as effective_radius_um
+from .plumes import height_shift as height_shift
 from .plumes import lifted as lifted
 from .plumes import plume as plume
 from .plumes import ssa_shift as ssa_shift

@@ -137,13 +137,12 @@ def effective_radius_um(species: str) -> Quantity:
     )
 
 
-def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:
-    """What a retrieval of a plume assumes, and how well that may be known.
+def height_shift(species: str) -> Quantity:
+    """Shift of both edges of a plume, its extinction and thickness kept. [m]
 
-    Albedo of the ground in each band, to 0.01; height of the plume, to 500 m; its asymmetry factor,
-    to a shift of the logit of 0.1, which is 0.023 at 0.65. A `MiePlume` has no asymmetry factor.
+    Where it is retrieved or assumed, levels go with the edges (`ForwardModel.plume_edges`).
     """
-    height = Quantity(
+    return Quantity(
         "height_shift",
         "m",
         f"shift of the height of the {species} plume",
@@ -153,6 +152,14 @@ def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:
         sigma=500.0,
         mean=0.0,
     )
+
+
+def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:
+    """What a retrieval of a plume assumes, and how well that may be known.
+
+    Albedo of the ground in each band, to 0.01; height of the plume, to 500 m; its asymmetry factor,
+    to a shift of the logit of 0.1, which is 0.023 at 0.65. A `MiePlume` has no asymmetry factor.
+    """
     asymmetry = Quantity(
         "asymmetry_shift",
         "1",
@@ -163,7 +170,7 @@ def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:
         sigma=0.1,
         mean=0.0,
     )
-    return StateVector((*(albedo(band) for band in bands), height, asymmetry))
+    return StateVector((*(albedo(band) for band in bands), height_shift(species), asymmetry))
 
 
 def lifted(plume: Plume | MiePlume, value: Float[Array, "*batch"]) -> Plume | MiePlume:

@@ -139,12 +139,13 @@ SIX = ("C01", "C02", "C03", "C04", "C05", "C06")
 GEOMETRY = Geometry(jnp.asarray(0.7), jnp.asarray(0.5), jnp.asarray(2.0))
 
 
-def seen(air, bands=SIX):
+def seen(air, bands=SIX, **settings):
     """Reflectances of airs stacked."""
     count = air.height.shape[0]
     grounds = dict.fromkeys(bands, jnp.full(count, 0.15))
     geometry = jax.tree.map(lambda x: jnp.full(count, x), GEOMETRY)
-    return brf(State(air, grounds, geometry), bands, num_streams=2, num_doublings=2)
+    state = State(air, grounds, geometry)
+    return brf(state, bands, num_streams=2, num_doublings=2, **settings)
 
 
 def with_nothing_above(air, count=4):
@@ -202,3 +203,9 @@ def test_derivatives_in_height():
         difference = (4 * one - two) / (2 * np.diag(step))
         np.testing.assert_allclose(found, difference, rtol=1e-4, err_msg=str(edges))
         assert np.abs(found).min() > 1e-8
+
+
+def test_the_operator_puts_them_in_where_it_is_asked_to():
+    air = stacked([make_air(47), make_air(47, base=900.0)])
+    by_hand = seen(jax.jit(jax.vmap(with_plume_edges))(air))
+    np.testing.assert_allclose(seen(air, plume_edges=True), by_hand, rtol=ROUNDING)

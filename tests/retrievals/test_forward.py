@@ -7,9 +7,11 @@ import numpy as np
 from abi_operator import reflectance_factor
 from abi_operator.scene import column_states, gases_of, simulate
 from retrievals.declarations import plume
-from retrievals.forward import ForwardModel
+from retrievals.declarations.plumes import height_shift
+from retrievals.forward import ForwardModel, prepared
 from retrievals.kinds import BANDS
 from retrievals.observation import observe
+from retrievals.state_vector import StateVector
 
 ROUNDING = 1e-11
 
@@ -29,6 +31,16 @@ def test_the_state_is_what_is_seen(columns, forward):
     settings = {name: getattr(forward, name) for name in ("gases", "num_streams", "num_doublings")}
     expected = reflectance_factor(state, BANDS, **settings)
     np.testing.assert_allclose(model(x, states), expected, rtol=ROUNDING)
+
+
+def test_where_x_moves_a_plume_levels_go_with_it(columns, forward):
+    """So that slopes in its height do not change in steps; of other unknowns nobody needs them."""
+    _, states, _ = columns
+    lifted = StateVector((*forward.vector.quantities, height_shift("smoke")))
+    assert lifted.moves_plumes(states) and not forward.vector.moves_plumes(states)
+    assert prepared(forward, states).plume_edges is None
+    assert prepared(replace(forward, vector=lifted), states).plume_edges
+    assert prepared(replace(forward, vector=lifted, plume_edges=False), states).plume_edges is False
 
 
 def test_gases_and_ice_of_the_simulation_are_those_of_the_forward_model(make_scenario):
