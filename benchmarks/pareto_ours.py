@@ -107,6 +107,15 @@ def truth(columns: Columns, emission=True, num_streams=TRUE_STREAMS):
     return as_brf(parts, value(parts, {"num_streams": num_streams}))
 
 
+def without_correction(columns: Columns):
+    """The same by delta-M alone, which knows the moments that it solves with and no others."""
+    found = np.empty(columns.count)
+    for part in parts_of(columns, TRUE_STREAMS, emission=False):
+        given = {k: x for k, x in part.arguments.items() if k != "phase_function"}
+        found[part.rows] = toa_brf(**given, num_streams=TRUE_STREAMS, single_scattering=None)
+    return found
+
+
 def peaked(columns: Columns):
     """Whether 64 streams leave a part of a column's phase functions to delta-M."""
     last = columns.moments(TRUE_STREAMS + 1)[..., -1]

@@ -75,14 +75,17 @@ def scaled(tau, ssa, moments):
     """Layers of which what the series does not reach goes on: delta-M at the last moment.
 
     The correction sums the series, and one that is cut off far from its end, as those of drops and
-    crystals are, swings about the phase function by more than that. Delta-M at fewer moments, as a
-    solver does it, gives the same afterwards as before.
+    crystals are, swings about the phase function by more than that: so the second half of it fades
+    out as well. Delta-M at fewer moments, as a solver does it, gives the same afterwards as before.
     """
-    f = moments[..., -1]
+    f, length = moments[..., -1], moments.shape[-1] - 1
     if f.max() < CUT:
         return tau, ssa, moments[..., :-1]
+    fade = np.clip(2 * np.arange(length) / length - 1, 0, 1)
+    window = 0.5 * (1 + np.cos(np.pi * fade))
     kept = 1 - ssa * f
-    return kept * tau, (1 - f) * ssa / kept, (moments[..., :-1] - f[..., None]) / (1 - f)[..., None]
+    left = (moments[..., :-1] - f[..., None]) / (1 - f)[..., None]
+    return kept * tau, (1 - f) * ssa / kept, window * left
 
 
 def arrays_of(columns: Columns, num_moments):
