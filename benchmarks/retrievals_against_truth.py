@@ -4,8 +4,8 @@
                                                   [--rows 1 2 3 4 5 6]
 
 Random pixels of `benchmarks/retrievals_pixels.py`: clear air of 20 layers, everything a pixel's own
-(sun to 75 degrees, view to 70, albedo 0.01 to 0.4 in every band). Float64. Names are closure, fire
-and calibration; without any all run, in some five minutes for 1,024 pixels on two cores.
+(sun to 75 degrees, view to 70, albedo 0.01 to 0.4 in every band). Float64. Names are closure, fire,
+starts and calibration; without any all run, in some five minutes for 1,024 pixels on two cores.
 
 - closure: no noise and no prior, from C01 C02 C03, and three unknowns from C01 C02 C03 C05 C06 as
   well; aod_550 0.05 to 4, ssa 0.80 to 0.99 in C01, effective radius over the most of a table.
@@ -15,6 +15,8 @@ and calibration; without any all run, in some five minutes for 1,024 pixels on t
   (the mean of the bands). Pixels of which no band tells (d brf / d ln aod below 1e-6) are counted
   apart.
 - fire closure: C05 C06 C07, 450 to 1,200 K, fraction 1e-4 to 0.04, by day, unsaturated pixels.
+- starts: the pixels of the calibration, from one start each, whose optical depth is ten times too
+  large (up to nearly the limit of the retrieval) or too small.
 - calibration: truth drawn from the prior (0.7 in ln aod, 0.5 in the logit of ssa), the imager's
   noise; a pixel that did not converge is not covered. The linearity test is that of
   `optimal_estimation`; coverage is that of its error bars, and that of the intervals of
@@ -41,9 +43,12 @@ from retrievals import (
     prepared,
     retrieve_pixels,
 )
-from retrievals.declarations import fire, plume
+from retrievals.declarations import AOD_LIMIT, fire, plume
+from retrievals.input_checks import checked
 from retrievals.intervals import posterior_intervals
+from retrievals.inverse import DEFAULT_MINIMISER
 from retrievals.optimal_estimation import LARGEST_NONLINEARITY, estimates
+from retrievals.rounds import minimise
 
 SECONDS = "seconds for all, compiling too"
 MORE_BANDS = (*BANDS, "C05", "C06")
@@ -159,6 +164,38 @@ def fire_closure(num_pixels, streams):
     )
 
 
+def poor_starts(num_pixels, streams):
+    names = ("aod_550", "ssa_shift")
+    forward, observation, states, prior, truth = with_prior(num_pixels, streams, names)
+    usual = retrieve_pixels(forward, observation, states, prior=prior).inversion
+    diagnosed = estimates(forward, observation, states, usual.x, prior)
+    sigma = np.sqrt(np.diagonal(diagnosed.posterior_covariance, axis1=1, axis2=2))
+    _, observation, prior = checked(forward, observation, prior)
+    aod = np.asarray(forward.vector.values(truth)["aod_550"])
+    print(
+        "\none start of a wrong optical depth, shares of pixels [%]:\n\n"
+        "| times the true one | converged | as from the usual starts, within 0.1 sigma | "
+        f"not finite, told | not finite, not told | steps, mean | most |\n|{' --- |' * 7}"
+    )
+    for factor in (10.0, 0.1):
+        wrong = np.minimum(factor * aod, 0.99 * AOD_LIMIT)
+        x_first = np.asarray(forward.vector.x(wrong, np.zeros(num_pixels)))
+        minimiser = DEFAULT_MINIMISER.chosen(True)
+        found = minimise(forward, minimiser, (prior, observation, states), x_first)
+        same = np.all(np.abs(found.x - usual.x) <= 0.1 * sigma, axis=1)
+        lost = ~np.isfinite(found.x).all(axis=1)
+        cells = (
+            f"{factor:g}",
+            percent(found.converged),
+            percent(same & found.converged),
+            percent(lost & ~found.converged),
+            percent(lost & found.converged),
+            f"{np.mean(found.num_steps):.1f}",
+            str(np.max(found.num_steps)),
+        )
+        print(f"| {' | '.join(cells)} |", flush=True)
+
+
 def calibration(num_pixels, streams):
     names = ("aod_550", "ssa_shift")
     forward, observation, states, prior, truth = with_prior(num_pixels, streams, names)
@@ -201,7 +238,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pixels", type=int, default=512)
     parser.add_argument("--streams", type=int, default=8)
-    parser.add_argument("--only", default="closure,fire,calibration")
+    parser.add_argument("--only", default="closure,fire,starts,calibration")
     numbers = range(1, len(CLOSURES) + 1)
     parser.add_argument("--rows", type=int, nargs="+", choices=numbers, help="of the closure")
     arguments = parser.parse_args()
@@ -211,6 +248,7 @@ def main():
     studies = {
         "closure": partial(closure, chosen=arguments.rows or numbers),
         "fire": fire_closure,
+        "starts": poor_starts,
         "calibration": calibration,
     }
     for name in arguments.only.split(","):
