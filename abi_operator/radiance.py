@@ -82,15 +82,51 @@ def radiance(
     if is_concrete(state):
         check_state(state)
     mu0 = state.geometry.mu0
-    share = jnp.where(mu0 > 0, 1 / jnp.asarray(sun_distance, mu0.dtype) ** 2, 0)
-    sun = {x: solar_irradiance(x, how.satellite) * share for x in bands}
+    sun = sunlight(mu0, bands, how.satellite, sun_distance)
     options = Options(bands, tuple(emitting), how)
     found = solve(Inputs(state, {x: sun[x] for x in emitting}), options)
-    # What is no emission is the sun's times its cosine, which may be below 0 only where it is 0.
-    reflected = jnp.where(mu0 > 0, mu0 / np.pi, 0)
-    factor = [jnp.ones_like(mu0) if x in emitting else sun[x] * reflected for x in bands]
+    factor = [jnp.ones_like(mu0) if x in emitting else of_white_ground(mu0, sun[x]) for x in bands]
     seen = jnp.cos(state.geometry.view_zenith) > 0
     return jnp.where(seen[..., None], found * jnp.stack(factor, axis=-1), jnp.nan)
+
+
+def sunlight(
+    mu0: Float[Array, "*batch"],
+    bands: Sequence[str],
+    satellite: str,
+    sun_distance: Float[Array, "*batch"] | float = 1.0,
+) -> dict[str, Float[Array, "*batch"]]:
+    """Solar irradiance of each band at the sun's distance, 0 by night. [W m-2 um-1]
+
+    Parameters
+    ----------
+    mu0
+        Cosine of the solar zenith angle. [-]
+    bands, satellite
+        Names.
+    sun_distance
+        Distance of the sun. [AU]
+    """
+    share = jnp.where(mu0 > 0, 1 / jnp.asarray(sun_distance, mu0.dtype) ** 2, 0)
+    return {x: solar_irradiance(x, satellite) * share for x in bands}
+
+
+def of_white_ground(
+    mu0: Float[Array, "*batch"], sun: Float[Array, "*batch"]
+) -> Float[Array, "*batch"]:
+    """Radiance of a white Lambertian ground without air. [W m-2 sr-1 um-1]
+
+    It turns a bidirectional reflectance factor into a radiance.
+
+    Parameters
+    ----------
+    mu0
+        Cosine of the solar zenith angle. [-]
+    sun
+        Solar irradiance, from `sunlight`. [W m-2 um-1]
+    """
+    # The cosine may be below 0 only where the sunlight is 0.
+    return sun * jnp.where(mu0 > 0, mu0 / np.pi, 0)
 
 
 @with_keywords(ByName, Settings())

@@ -74,14 +74,27 @@ def reflectance_factor(
     Arguments and errors are those of `brf`; where the satellite is out of sight it is NaN.
     """
     value = brf(state, bands, **settings)
-    return _with_the_suns_cosine(value, state.geometry.solar_zenith, state.geometry.view_zenith)
+    return with_the_suns_cosine(value, state.geometry.solar_zenith, state.geometry.view_zenith)
 
 
 # One program each, and not one for every operation, forward and backward.
 
 
 @jax.jit
-def _with_the_suns_cosine(value: Array, solar_zenith: Array, view_zenith: Array) -> Array:
+def with_the_suns_cosine(
+    value: Float[Array, "*batch band"],
+    solar_zenith: Float[Array, "*batch"],
+    view_zenith: Float[Array, "*batch"],
+) -> Float[Array, "*batch band"]:
+    """Reflectance factor of a bidirectional one: 0 by night, NaN with the satellite out of sight.
+
+    Parameters
+    ----------
+    value
+        Bidirectional reflectance factor. [-]
+    solar_zenith, view_zenith
+        Zenith angles of sun and satellite. [rad]
+    """
     mu0, mu = (jnp.cos(jnp.asarray(x, value.dtype))[..., None] for x in (solar_zenith, view_zenith))
     # Where brf is NaN its derivative in mu0 would be too.
     lit = (mu0 > 0) & (mu > 0)

@@ -4,7 +4,7 @@ import json
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -16,11 +16,13 @@ from ..files import InputError, output_folder
 from .comparison import (
     INPUT_TOLERANCE,
     JACOBIAN_TOLERANCE,
+    OUTPUT_TOLERANCE,
     SMALLEST_ELASTICITY,
     SMALLEST_INPUT,
     VALUE_TOLERANCE,
 )
 from .evaluation import UNITS, Jacobians, Request
+from .outputs import PIECEWISE_CONSTANT, Outputs
 
 _TITLE = "Baseline of Jacobians of abi_operator"
 _ADVICE = "give a file that 'abi-operator jacobian save' wrote"
@@ -106,11 +108,13 @@ def write_baseline(path: str | PathLike[str], baseline: Baseline) -> None:
         }
         | {f"{name}_version": version for name, version in versions().items()},
     )
+    if of.outputs is not None:
+        dataset = dataset.assign(_variables(of.outputs)).assign_coords(_coordinates(of))
     target = Path(path).absolute()
     if target.is_dir():
         raise InputError(f"{path} is a folder; give the name of a file.")
     with output_folder(target.parent) as folder:
-        encoding = {name: numbers for name in ("value", "jacobian", "state")}
+        encoding = {name: numbers for name, x in dataset.items() if x.dtype == np.float64}
         dataset.to_netcdf(folder / target.name, engine="netcdf4", encoding=encoding)
 
 
@@ -149,6 +153,7 @@ def read_baseline(path: str | PathLike[str]) -> Baseline:
                 json.loads(attributes["requested_settings"]),
             ),
             settings=json.loads(attributes["settings"]),
+            outputs=_outputs_in(dataset),
         )
         found = {name: str(attributes[f"{name}_version"]) for name in versions()}
         history = tuple(str(attributes["history"]).splitlines())
@@ -160,9 +165,39 @@ def read_baseline(path: str | PathLike[str]) -> Baseline:
     return Baseline(jacobians, scenario, found, history)
 
 
+def _variables(outputs: Outputs) -> dict[str, tuple[Any, ...]]:
+    return {
+        "output_units": ("output", np.array(outputs.units, dtype=object), _OUTPUT_UNITS),
+        "output_value": (("output_row", "output"), outputs.value, _OUTPUT_VALUE),
+        "output_slope": (("output_row", "output", "band"), outputs.slope, _OUTPUT_SLOPE),
+    }
+
+
+def _coordinates(of: Jacobians) -> dict[str, Any]:
+    """Names of the outputs and of their rows, the columns and what is beside them."""
+    assert of.outputs is not None
+    return {
+        "output": np.array(of.outputs.names, dtype=object),
+        "output_row": np.array((*of.columns, *of.outputs.beside), dtype=object),
+    }
+
+
+def _outputs_in(dataset: xr.Dataset) -> Outputs | None:
+    """The outputs of a file; None in one that was written before there were any."""
+    if "output" not in dataset:
+        return None
+    names, units, rows = (
+        tuple(str(x) for x in dataset[name].values)
+        for name in ("output", "output_units", "output_row")
+    )
+    value, slope = (dataset[name].values for name in ("output_value", "output_slope"))
+    return Outputs(names, units, rows[dataset.sizes["column"] :], value, slope)
+
+
 _TOLERANCES = {
     "value": VALUE_TOLERANCE,
     "jacobian": JACOBIAN_TOLERANCE,
+    "output": OUTPUT_TOLERANCE,
     "state": INPUT_TOLERANCE,
     "smallest_elasticity": SMALLEST_ELASTICITY,
     "smallest_input": SMALLEST_INPUT,
@@ -176,3 +211,13 @@ _JACOBIAN = {
 }
 _STATE = {"long_name": "the inputs", "comment": "units: input_units"}
 _INPUT_UNITS = {"long_name": "units of the inputs"}
+_OUTPUT_UNITS = {"long_name": "units of the outputs"}
+_OUTPUT_VALUE = {
+    "long_name": "what the instrument and products make of the values",
+    "comment": "units: output_units; NaN where there is no such output",
+}
+_OUTPUT_SLOPE = {
+    "long_name": "derivative of the output by the value of the band",
+    "comment": "units: output_units over those of the quantity; NaN where there is none, and of "
+    f"what is piecewise constant: {', '.join(PIECEWISE_CONSTANT)}",
+}

@@ -82,7 +82,8 @@ def _accept(
     with one_sentence():
         comparison: Comparison = accept(file, reason, scenario)
     typer.echo(f"{file}: {report(comparison, rows)}")
-    typer.echo(f"wrote {file}" if comparison else f"{file} stays as it is")
+    written = comparison or comparison.to_keep
+    typer.echo(f"wrote {file}" if written else f"{file} stays as it is")
 
 
 def how_to_accept(file: Path, scenario: str | None) -> str:

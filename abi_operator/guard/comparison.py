@@ -11,7 +11,10 @@ the band's most important input does. Where :math:`|x|` is less than 1e-3 of the
 the same field in all columns, that stands for it (1, in the field's unit, where all are 0), so that
 a derivative by what is absent has a finite tolerance. A value may move by 1e-12 of itself or of E,
 a number of the state by 1e-12 of the largest of its field: values and states have to be float64
-throughout, which the Jacobian's five digits would not show.
+throughout, which the Jacobian's five digits would not show. An output of the instrument or of a
+product may move by 1e-10 of itself, as it is a difference of values at times, but no less than of
+1e-3 of the largest of its name; its slopes by the bands' values as entries of the Jacobian, against
+the largest of them.
 
 All are far above rounding: `tests/abi_operator/guard/test_spread.py` measures how far entries
 scatter over threads and batches.
@@ -24,6 +27,7 @@ import numpy as np
 
 from .evaluation import Jacobians
 from .inputs import field_of
+from .outputs import Outputs, in_common
 
 JACOBIAN_TOLERANCE = 1e-5
 """Of an entry of the Jacobian. [-]"""
@@ -33,6 +37,8 @@ SMALLEST_INPUT = 1e-3
 """Size that an input is taken for at least, of the largest number of its field. [-]"""
 VALUE_TOLERANCE = 1e-12
 """Of a value. [-]"""
+OUTPUT_TOLERANCE = 1e-10
+"""Of an output. [-]"""
 INPUT_TOLERANCE = 1e-12
 """Of a number of the state. [-]"""
 
@@ -43,10 +49,11 @@ class Moved(NamedTuple):
     Parameters
     ----------
     column, band, entry
-        Where: the band is empty for a number of the state; the entry is an input, or empty for
-        the value itself.
+        Where: the band is empty for a number of the state and for an output; the entry is an
+        input, ``"value"`` for the slope of an output by the band's value, or empty for the value
+        itself.
     quantity
-        ``"state"``, ``"brf"`` or ``"radiance"``.
+        ``"state"``, ``"brf"``, ``"radiance"`` or the name of an output.
     stored, now, tolerance
         In the units of the entry.
     """
@@ -79,11 +86,14 @@ class Comparison(NamedTuple):
         Numbers that moved, those of the state first, then the largest excess first.
     num_compared
         How many numbers both evaluations have.
+    to_keep
+        What is not in the file yet, as it is from before, in sentences: nothing that moved.
     """
 
     changed: list[str]
     moved: list[Moved]
     num_compared: int
+    to_keep: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.changed or self.moved)
@@ -121,9 +131,18 @@ def compare(stored: Jacobians, now: Jacobians) -> Comparison:
             f"{bands[b]} of column {columns[i]!r} is {new.quantity[i, b] or 'absent'}, "
             f"was {old.quantity[i, b] or 'absent'}."
         )
+    numbers, to_keep = [old.state, old.value, old.jacobian], ()
+    if old.outputs is not None and new.outputs is not None:
+        both = in_common(old.outputs, new.outputs)
+        rest += _moved_outputs(*both, (*columns, *both[0].beside), bands)
+        numbers += both[0].value, both[0].slope
+    elif new.outputs is not None:
+        to_keep = (
+            f"{len(new.outputs.names)} outputs are not in the file yet; accept to keep them.",
+        )
     rest.sort(key=lambda entry: -entry.excess)
-    compared = sum(np.count_nonzero(~np.isnan(x)) for x in (old.state, old.value, old.jacobian))
-    return Comparison(changed, moved + rest, int(compared))
+    compared = sum(np.count_nonzero(~np.isnan(x)) for x in numbers)
+    return Comparison(changed, moved + rest, int(compared), to_keep)
 
 
 def select(
@@ -145,11 +164,12 @@ def select(
         value=of.value[np.ix_(i, b)],
         jacobian=of.jacobian[np.ix_(i, b, k)],
         state=of.state[np.ix_(i, k)],
+        outputs=None if of.outputs is None else of.outputs.part(i, b),
     )
 
 
 def excess(stored: Jacobians, now: Jacobians) -> float:
-    """Largest change of a value or an entry of the Jacobian, in tolerances. [-]
+    """Largest change of a value, an entry of the Jacobian or an output, in tolerances. [-]
 
     Parameters
     ----------
@@ -158,10 +178,13 @@ def excess(stored: Jacobians, now: Jacobians) -> float:
     """
     _, on_value, on_jacobian = _tolerances(stored)
     largest = 0.0
-    for old, new, tolerance in (
-        (stored.value, now.value, on_value),
-        (stored.jacobian, now.jacobian, on_jacobian),
-    ):
+    pairs = [(stored.value, now.value, on_value), (stored.jacobian, now.jacobian, on_jacobian)]
+    if stored.outputs is not None and now.outputs is not None:
+        old, new = in_common(stored.outputs, now.outputs)
+        pairs += zip(
+            (old.value, old.slope), (new.value, new.slope), _output_tolerances(old), strict=True
+        )
+    for old, new, tolerance in pairs:
         change = np.abs(new - old)
         differs = change > 0
         if np.any(np.isnan(old) != np.isnan(new)) or np.any(tolerance[differs] == 0):
@@ -191,6 +214,32 @@ def _tolerances(stored: Jacobians) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     )
 
 
+def _output_tolerances(stored: Outputs) -> tuple[np.ndarray, np.ndarray]:
+    """Tolerances of the outputs' values and of their slopes."""
+    sizes, steepness = np.nan_to_num(np.abs(stored.value)), np.nan_to_num(np.abs(stored.slope))
+    largest = np.max(sizes, axis=0, initial=0.0)
+    floor = np.where(largest > 0, SMALLEST_INPUT * largest, 1.0)
+    steepest = np.max(steepness, axis=-1, keepdims=True, initial=0.0)
+    return (
+        OUTPUT_TOLERANCE * np.maximum(sizes, floor),
+        JACOBIAN_TOLERANCE * np.maximum(steepness, SMALLEST_ELASTICITY * steepest),
+    )
+
+
+def _moved_outputs(
+    old: Outputs, new: Outputs, rows: tuple[str, ...], bands: tuple[str, ...]
+) -> list[Moved]:
+    on_value, on_slope = _output_tolerances(old)
+    moved = []
+    for i, k in np.argwhere(_beyond(old.value, new.value, on_value)):
+        numbers = old.value[i, k], new.value[i, k], on_value[i, k]
+        moved.append(Moved(rows[i], "", "", old.names[k], *map(float, numbers)))
+    for i, k, b in np.argwhere(_beyond(old.slope, new.slope, on_slope)):
+        numbers = old.slope[i, k, b], new.slope[i, k, b], on_slope[i, k, b]
+        moved.append(Moved(rows[i], bands[b], "value", old.names[k], *map(float, numbers)))
+    return moved
+
+
 def _beyond(old: np.ndarray, new: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
     """Where numbers moved; NaN is what is not there, and what is there in one alone has moved."""
     return (np.abs(new - old) > tolerance) | (np.isnan(old) != np.isnan(new))
@@ -203,17 +252,26 @@ def _changed(stored: Jacobians, now: Jacobians) -> list[str]:
         old, new = stored.settings.get(name), now.settings.get(name)
         if old != new:
             changed.append(f"setting {name} is {new}, was {old}.")
-    for what, old, new in (
+    names = [
         ("column", stored.columns, now.columns),
         ("band", stored.bands, now.bands),
         ("input", stored.inputs, now.inputs),
-    ):
+    ]
+    units = [("input", stored.inputs, stored.units, now.inputs, now.units)]
+    if stored.outputs is not None and now.outputs is not None:
+        old, new = stored.outputs, now.outputs
+        names += [("output", old.names, new.names), ("row of outputs", old.beside, new.beside)]
+        units.append(("output", old.names, old.units, new.names, new.units))
+    elif stored.outputs is not None:
+        changed.append("outputs are gone.")
+    for what, old, new in names:
         gone = [name for name in old if name not in set(new)]
         added = [name for name in new if name not in set(old)]
         changed += [f"{what} {name} is gone." for name in gone]
         changed += [f"{what} {name} is new." for name in added]
-    units = dict(zip(now.inputs, now.units, strict=True))
-    for name, unit in zip(stored.inputs, stored.units, strict=True):
-        if units.get(name, unit) != unit:
-            changed.append(f"input {name} is in {units[name]}, was in {unit}.")
+    for what, old, old_units, new, new_units in units:
+        now_in = dict(zip(new, new_units, strict=True))
+        for name, unit in zip(old, old_units, strict=True):
+            if now_in.get(name, unit) != unit:
+                changed.append(f"{what} {name} is in {now_in[name]}, was in {unit}.")
     return changed

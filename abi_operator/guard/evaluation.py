@@ -15,6 +15,8 @@ from ..radiance import FIRE_BANDS, THERMAL, radiance
 from ..reflectance import brf
 from ..state_checks import check_state
 from .inputs import as_matrix, one_by_one, same_structure, structure
+from .outputs import Outputs, outputs_of
+from .seen import Seen
 
 NUM_DOUBLINGS = 8
 """Doublings of the solver, a static setting of what is compiled: at 8 streams right to 1e-12 for
@@ -63,6 +65,8 @@ class Jacobians(NamedTuple):
         What was asked for.
     settings
         Every setting of the operators, asked for or default.
+    outputs
+        What the instrument and products make of the values; None in a file from before.
     """
 
     columns: tuple[str, ...]
@@ -75,6 +79,7 @@ class Jacobians(NamedTuple):
     state: np.ndarray
     request: Request
     settings: dict[str, Any]
+    outputs: Outputs | None = None
 
 
 def evaluate(
@@ -82,7 +87,7 @@ def evaluate(
     bands: Sequence[str] | None = None,
     **settings: Any,
 ) -> Jacobians:
-    """Evaluate the operator and its whole Jacobian, in float64 whatever JAX is set to.
+    """Evaluate the operator, its whole Jacobian and outputs, in float64 whatever JAX is set to.
 
     Bands in which the state emits (C07; C05 and C06 too where there is a fire) are evaluated by
     `radiance`, all others by `brf`. Derivatives are in reverse mode, since there are more inputs
@@ -119,7 +124,22 @@ def evaluate(
                 f"no state is specified for {band}: it needs an albedo, the optics of plumes and, "
                 "in C07, temperatures."
             )
-    return _aligned(list(columns), found, request, complete)
+    aligned = _aligned(list(columns), found, request, complete)
+    with jax.enable_x64(True):
+        return aligned._replace(outputs=outputs_of(seen_in(aligned), complete["satellite"]))
+
+
+def seen_in(of: Jacobians) -> Seen:
+    """What outputs are made of: values by band, and angles, which are among the inputs."""
+    angles = (
+        of.state[:, of.inputs.index(f"geometry.{name}")]
+        for name in ("solar_zenith", "view_zenith", "relative_azimuth")
+    )
+    return Seen(
+        {band: jnp.asarray(of.value[:, k]) for k, band in enumerate(of.bands)},
+        {band: of.quantity[:, k] != "radiance" for k, band in enumerate(of.bands)},
+        *angles,
+    )
 
 
 def resolved(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -25,7 +25,8 @@ def report(comparison: Comparison, num_rows: int | None = NUM_ROWS) -> str:
         Rows to show at most; None for all.
     """
     if not comparison:
-        return f"nothing moved in {comparison.num_compared} numbers."
+        nothing = f"nothing moved in {comparison.num_compared} numbers."
+        return "\n".join([nothing, *comparison.to_keep])
     lines = _shortened(comparison.changed, num_rows, "changes")
     rows = _rows(comparison.moved)
     table = [_HEADER, *_shortened(rows, num_rows, "")]
@@ -36,6 +37,7 @@ def report(comparison: Comparison, num_rows: int | None = NUM_ROWS) -> str:
             lines.append(f"... and {len(rows) + 1 - len(table)} more rows.")
         count = f"{len(comparison.moved)} of {comparison.num_compared} numbers"
         lines.append(f"{count} moved by more than their tolerance.")
+    lines += comparison.to_keep
     return "\n".join(lines)
 
 

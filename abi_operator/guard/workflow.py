@@ -67,7 +67,7 @@ def check(path: FilePath, scenario: str | None = None) -> Comparison:
 def accept(path: FilePath, reason: str, scenario: str | None = None) -> Comparison:
     """Replace a baseline by what is computed now, and add the reason to its history.
 
-    A baseline in which nothing moved stays as it is.
+    A baseline in which nothing moved stays as it is, unless it is from before outputs were kept.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def accept(path: FilePath, reason: str, scenario: str | None = None) -> Comparis
     """
     reason = _one_line(reason)
     comparison, stored, jacobians = _compared(path, scenario)
-    if comparison:
+    if comparison or comparison.to_keep:
         stored = stored._replace(scenario=scenario or stored.scenario)
         _accept(path, stored, jacobians, comparison, reason)
     return comparison
@@ -165,7 +165,7 @@ def guard_states(
         return ""
     stored = read_baseline(path)
     comparison = compare(stored.jacobians, jacobians)
-    if comparison and reason is not None:
+    if (comparison or comparison.to_keep) and reason is not None:
         _accept(path, stored, jacobians, comparison, reason)
     elif comparison:
         return f"{path}: {report(comparison)}\nIf that is wanted, accept it with {how}"
