@@ -20,6 +20,7 @@ class Veil:
 
     vector: StateVector = plume("smoke")  # noqa: RUF009
     bands: tuple[str, ...] = BANDS
+    plume_edges: bool | None = False
 
     def __call__(self, x, state):
         values = self.vector.values(x)

@@ -11,6 +11,7 @@ from ..products import (
     cimss_stretch,
     cira_stretch,
     corrected_colors,
+    crefl_air,
     crefl_stretch,
     derived_green,
     fire_contrast,
@@ -38,9 +39,11 @@ _LOW_PRESSURE = 8e4  # of high ground [Pa]
 # Radiances of C06 around a burning pixel, of which another burns too. [W m-2 sr-1 um-1]
 _PICTURE = 0.5 + 0.01 * np.arange(225.0).reshape(15, 15)
 _BURNING, _BURNING_TOO = (7, 6), (7, 9)
-# Rayleigh depths, one for each cell of the tables' splines and their ends, and cosines and
-# azimuth at which the air is lit and seen. [-], [-], [rad]
+# Rayleigh depths: the largest of crefl's formulas; one for each cell of the tables' splines and one
+# below. [-]
+_THICKEST_OF_CREFL = 1.0
 _DEPTHS = 1e-3 * 400.0 ** (np.array([-0.5, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]) / 8)
+# Cosines and azimuth at which the air is lit and seen. [-], [rad]
 _COSINES = 0.1 + 0.9 * (np.arange(24) + 0.5) / 24
 _AZIMUTH = np.array(0.7)
 
@@ -72,15 +75,18 @@ def product_outputs(seen: Seen) -> dict[str, Float[Array | np.ndarray, " column"
 def product_constants(bands: Collection[str]) -> dict[str, float]:
     """Outputs by name that are functions of no column: the response of pure air.
 
-    Sums over all angles of each depth, to which every number of the tables adds something.
+    Sums over all angles of each depth, to which every number of the tables adds something, and of
+    crefl's formulas where they end, to which their highest powers do.
     """
     if not set(_AIRY) & set(bands):
         return {}
     found = {}
-    for tau in _DEPTHS:
-        air = rayleigh_air(tau, _COSINES[:, None], _COSINES, _AZIMUTH)
+    angles = _COSINES[:, None], _COSINES, _AZIMUTH
+    layers = {f"{tau:.4f}": rayleigh_air(tau, *angles) for tau in _DEPTHS}
+    layers["crefl"] = crefl_air(_THICKEST_OF_CREFL, *angles)
+    for layer, air in layers.items():
         for name, value in zip(air._fields, air, strict=True):
-            found[f"pure_air.{name}.{tau:.4f}"] = float(np.sum(value))
+            found[f"pure_air.{name}.{layer}"] = float(np.sum(value))
     return found
 
 

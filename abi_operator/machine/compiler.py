@@ -20,7 +20,7 @@ import jax
 
 from .processor import vector_bits
 
-_WIDTH, _EMITTERS = "xla_cpu_prefer_vector_width", "xla_cpu_use_fusion_emitters"
+_WIDTH, _EMITTERS = _OURS = "xla_cpu_prefer_vector_width", "xla_cpu_use_fusion_emitters"
 
 # XLA passes over names in xla_ here that it does not know; other flags would end the process.
 _EXTRA = "xla_backend_extra_options"
@@ -44,11 +44,16 @@ def options() -> dict[str, int | bool]:
 def _is_known(name: str, value: int | bool) -> bool:
     """Whether this XLA has an option: asked by a program of nothing, as each version knows others.
 
-    One that it does not know would end every call.
+    One that it does not know would end every call. Versions up to 0.10 know ours and are not asked.
     """
-    program = jax.jit(lambda x: x, compiler_options={name: value})
+    if name in _OURS and jax.__version_info__ < (0, 11):
+        return True
+
+    def nothing(x: float) -> float:
+        return x
+
     try:
-        program.lower(0.0).compile()
+        jax.jit(nothing, compiler_options={name: value}).lower(0.0).compile()
     except jax.errors.JaxRuntimeError:
         return False
     return True

@@ -1,5 +1,6 @@
 """The command line, on the demonstration's files."""
 
+import shutil
 from importlib.metadata import EntryPoint
 
 import netCDF4

@@ -42,7 +42,7 @@ with jax.enable_x64(True):
     found = program(2.0, np.eye(3) + 0.5)
     assert found["name"][1] is None
     print(np.asarray(brf).tobytes().hex(), np.asarray(found["root"]).tobytes().hex())
-print([x["fun_name"] for x in traced])
+print([x["fun_name"] for x in traced if x["fun_name"] != "nothing"])
 """
 
 
