@@ -61,14 +61,13 @@ def started(case, folder, cores):
     else:  # all processes are on it together
         environment["XLA_PYTHON_CLIENT_PREALLOCATE"] = "false"
     command = [*before, sys.executable, str(HERE / "devices_case.py")]
-    process = subprocess.Popen(
+    return subprocess.Popen(
         [*command, json.dumps(asdict(case)), str(folder)],
         env=environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
-    return process
 
 
 def has_gpu():

@@ -5,8 +5,8 @@
 The columns are those of `pareto_columns`. A solver meets an error where the 99th percentile of
 |difference of brf| / max(brf, 0.01) does, against 64 streams with every layer, every mode and the
 whole phase function: this solver with nothing skipped, which nanodisort checks in the same run.
-Where phase functions are peaked, as those of droplets, it says how far 128 streams are from it,
-which take half a minute for ten columns. Other solvers have the cheapest setting that meets it on
+Where phase functions are peaked, as those of droplets, it says how far 128 streams are from it.
+Other solvers have the cheapest setting that meets it on
 these very columns (`pareto_peers`), this one streams fixed beforehand (`pareto_ours.STREAMS`).
 Times are from NumPy to NumPy in float64, compiling apart, by medians of rounds in which each has
 its turn. Three comparisons stand side by side: (a) nothing is skipped by anybody, (b) this solver

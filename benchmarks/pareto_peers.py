@@ -23,7 +23,6 @@ CORRECTED = ("nanodisort", "disortpp")  # those that have the correction, and en
 PLAIN = (*CORRECTED, "sasktran2")
 ONE_GEOMETRY = 0.6, 0.65, 1.6  # cosines of sun and view, azimuth [rad], for all columns
 LONGEST_SERIES = 385  # moments
-CUT = 1e-9  # last moment of series that are cut off
 SERIES_END = 1e-3  # (2l + 1) chi_l of the last moment of a series
 SAME = 1e-12  # optics of two layers that are one
 SEARCH_SECONDS = 5.0  # of a call of the search at most, roughly
@@ -79,7 +78,7 @@ def scaled(tau, ssa, moments):
     out as well. Delta-M at fewer moments, as a solver does it, gives the same afterwards as before.
     """
     f, length = moments[..., -1], moments.shape[-1] - 1
-    if f.max() < CUT:
+    if length < LONGEST_SERIES:  # it has an end
         return tau, ssa, moments[..., :-1]
     fade = np.clip(2 * np.arange(length) / length - 1, 0, 1)
     window = 0.5 * (1 + np.cos(np.pi * fade))
