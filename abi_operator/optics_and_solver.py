@@ -83,7 +83,7 @@ class _Program(NamedTuple):
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         return chunks_of_states(tile_size(leaves, self.structure, self.options))
 
-    def tile(self, leaves: Leaves) -> int:
+    def tile(self, leaves: Leaves, what: Any) -> int:
         return tile_size(leaves, self.structure, self.options)
 
     def need(self, leaves: Leaves) -> None:
@@ -122,7 +122,7 @@ class _Depths(NamedTuple):
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         return 1, *chunks_to_read()
 
-    def tile(self, leaves: Leaves) -> int:
+    def tile(self, leaves: Leaves, what: Any) -> int:
         return chunks_to_read()[-1]
 
     def need(self, leaves: Leaves) -> None:

@@ -265,7 +265,7 @@ def _flat(x: np.ndarray, own_axes: int, batch: tuple[int, ...]) -> np.ndarray:
 def _wanted(of: tuple[Program, Any], leaves: Leaves) -> Any:
     """The value, or the value and the slopes in what is wanted, `joined`."""
     program, what = of
-    own_axes, tile = program.own_axes, program.tile(leaves)
+    own_axes, tile = program.own_axes, program.tile(leaves, what)
     if what == "value":
         return tile_by_tile(program.value, leaves, own_axes, tile, program.need)
     both = partial(program.value_and_slopes, wanted=what)

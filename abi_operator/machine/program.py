@@ -36,8 +36,8 @@ class Program(Protocol):
         """Numbers of columns that are worth a program of what is wanted, rising."""
         ...
 
-    def tile(self, leaves: Leaves) -> int:
-        """Columns that are solved together, at most."""
+    def tile(self, leaves: Leaves, what: Any) -> int:
+        """Columns that are solved together, at most, for what is wanted."""
         ...
 
     def need(self, leaves: Leaves) -> Float[Array, " batch"] | None:

@@ -30,8 +30,8 @@ _SORTED_TILES = 32
 _SOLVER_TILES, _SOLVER_TILES_ELSEWHERE = 8, 2
 
 
-def tile_size(num_streams: int, dtype: Any) -> int:
-    """Columns that the solver takes at once, at most.
+def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
+    """Columns that the solver takes at once, at most; `rounds` tells whether most is in float32.
 
     Below 64 LLVM unrolls short loops over them number by number, without vectors
     (`algebra.weighted_rows` has what was done about it). Where a layer is one kernel (`kernels`) a
@@ -41,7 +41,7 @@ def tile_size(num_streams: int, dtype: Any) -> int:
         return _SOLVER_ELSEWHERE if num_streams <= 16 else _ELSEWHERE
     single = jnp.dtype(dtype) == jnp.float32
     if num_streams > 16:
-        return 64 if single else 32
+        return 64 if single or rounds else 32
     return 128 if single and num_streams > 8 else 64
 
 
@@ -57,13 +57,15 @@ def tile_of_grounds() -> int:
     return 64 if on_cpu() else _ELSEWHERE
 
 
-def chunks_of_columns(num_streams: int, dtype: Any, in_order: bool = False) -> tuple[int, ...]:
+def chunks_of_columns(
+    num_streams: int, dtype: Any, in_order: bool = False, rounds: bool = False
+) -> tuple[int, ...]:
     """Numbers of the solver's columns that are worth a program, rising.
 
     Those that are put `in_order` before they are cut into tiles are the more alike in a tile the
     more there are of them.
     """
-    tile = tile_size(num_streams, dtype)
+    tile = tile_size(num_streams, dtype, rounds)
     if in_order:
         return 8, tile, 8 * tile, _SORTED_TILES * tile
     # At few streams a chunk is solved in few times what it needs to begin and to end.

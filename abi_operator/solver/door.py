@@ -24,7 +24,7 @@ from .column import (
 from .foreknown import need
 from .method.doublings import unknown_doublings
 from .settings import Settings, check_settings
-from .skipping import company
+from .skipping import budget, company
 
 
 def solve(
@@ -125,10 +125,14 @@ class _Program(NamedTuple):
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         streams, dtype = self.options.num_streams, leaves[0].dtype
-        return chunks_of_columns(streams, dtype, in_order=self._in_order)
+        return chunks_of_columns(streams, dtype, self._in_order, self._rounds(what))
 
-    def tile(self, leaves: Leaves) -> int:
-        return tile_size(self.options.num_streams, jnp.result_type(*leaves))
+    def tile(self, leaves: Leaves, what: Any) -> int:
+        dtype = jnp.result_type(*leaves)
+        return tile_size(self.options.num_streams, dtype, self._rounds(what))
+
+    def _rounds(self, what: Any) -> bool:
+        return what == "value" and budget.rounds(self.options.error_budget)
 
     def need(self, leaves: Leaves) -> Array | None:
         return need(self._aligned(leaves), self.options) if self._in_order else None

@@ -25,6 +25,7 @@ from ..method.doublings import Doublings
 from ..method.ground import isotropic
 from ..method.layer import half_layer
 from ..method.mode_layers import read
+from ..method.rounding import as_deep_as_seen, in_single_precision
 from ..skipping.heat import Warm, lost
 from ..skipping.merging import summed
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
@@ -35,7 +36,7 @@ from .emitting_mode import (
     slope_of_light_from_above,
     slopes_of_mode,
 )
-from .modes import LATER, WHOLE, How, Mode, along, every_mode
+from .modes import LATER, WHOLE, How, Mode, along, every_mode, rounds
 from .room import Keeper
 
 
@@ -137,9 +138,15 @@ def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*b
     emitted = closed.emerging(light, one, 0.5 * lit.heating.above, nothing)[1]
     mean = first.weight * closed.reflection()[0] + emitted
 
+    lowered = in_single_precision if rounds(plan, _num_nodes(lit)) else lambda x: x
+    later, plan_of_later = lowered(lit), lowered(plan)
+
     def plus(total, mode, counts):
-        stack, _ = _stacked(lit, mode, mode.below(lit.ground, mean=False), None, *how)
-        found = counts * mode.weight * top(stack).reflection()[0]
+        own = lowered(mode)
+        ground = own.below(later.ground, mean=False)
+        stack, _ = _stacked(later, own, ground, None, plan_of_later, single_scattering)
+        reflection = top(stack).reflection()[0].astype(total.dtype)
+        found = counts * mode.weight * reflection
         total = total + found
         share = None if plan.error_budget is None else plan.share(total[None], jnp.abs(found))
         return total, None, share
@@ -156,6 +163,7 @@ def _stacked(
     single_scattering: bool,
 ) -> tuple[Bordered, Emission | None]:
     """All layers of a mode on the ground; only the mean has thermal light."""
+    rounded = rounds(plan, _num_nodes(lit))
 
     def put_on(below, air, jumps, doublings, odd, kernels, one, *number):
         # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
@@ -164,10 +172,11 @@ def _stacked(
         view_secant = read(air.view_secants, place)
         a, p = layer.matrices(light is not None, kernels, view_secant[None], single_scattering)
         own = jax.tree.map(lambda x: read(x, place), doublings)
-        y, z = half_layer(a, p, layer.tau, own)
+        tau = as_deep_as_seen(layer.tau) if rounded and light is None else layer.tau
+        y, z = half_layer(a, p, tau, own)
         if light is None:
-            return add_layer(stack, y, z, layer.tau), None
-        return add_emitting_layer(stack, light, y, z, layer.tau, read(jumps, place) * (p @ one))
+            return add_layer(stack, y, z, tau), None
+        return add_emitting_layer(stack, light, y, z, tau, read(jumps, place) * (p @ one))
 
     put_on = one_kernel(put_on, _num_nodes(lit), in_parts=True)
 

@@ -18,11 +18,12 @@ from ..method.bordered import Bordered
 from ..method.doublings import Doublings
 from ..method.layer import half_layer
 from ..method.mode_layers import read
+from ..method.rounding import as_deep_as_seen, in_single_precision
 from ..skipping import budget
 from ..skipping.budget import Expected
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .mode import Shared, mode_slopes
-from .modes import LATER, WHOLE, How, Mode, along, every_mode
+from .modes import LATER, WHOLE, How, Mode, along, every_mode, rounds
 from .room import Keeper
 
 
@@ -118,16 +119,19 @@ def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan
 def _reflectance(
     inputs: ModeSum, plan: Plan, single_scattering: bool
 ) -> Float[Array, "view *batch"]:
-    given, num_nodes = plan.layers.as_layers(), inputs.num_nodes
+    num_nodes = inputs.num_nodes
+    rounded = rounds(plan, num_nodes)
+    lowered = in_single_precision if rounded else lambda x: x
 
-    def reflection(mean: bool, mode: Mode) -> Array:
+    def reflection(mean: bool, mode: Mode, inputs: ModeSum, plan: Plan) -> Array:
         def put_on(stack, layers, doublings, odd, kernels, view_secants, *number):
             # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
             place = number[0] if number else jnp.zeros_like(odd)
             layer = layers.layer(place, odd)
             a, p = layer.matrices(mean, kernels, view_secants, single_scattering)
             own = jax.tree.map(lambda x: read(x, place), doublings)
-            return add_layer(stack, *half_layer(a, p, layer.tau, own), layer.tau)
+            tau = as_deep_as_seen(layer.tau) if rounded and not mean else layer.tau
+            return add_layer(stack, *half_layer(a, p, tau, own), tau)
 
         put_on = one_kernel(put_on, num_nodes, in_parts=True)
 
@@ -143,11 +147,12 @@ def _reflectance(
         # what leaves towards several views is a sum that it would share among threads.
         if plan.layers.tau.shape[0] > 1 and inputs.view_secants.shape[0] == 1:
             of_all = one_kernel(of_all, num_nodes, in_parts=True)
-        shared = given, plan, mode.order.odd, mode.kernels(), inputs.view_secants
+        layers = plan.layers.as_layers()
+        shared = layers, plan, mode.order.odd, mode.kernels(), inputs.view_secants
         return of_all(mode.below(inputs.ground, mean), *shared)
 
     def another(total, mode, counts):
-        found = reflection(False, mode)
+        found = reflection(False, lowered(mode), later, plan_of_later).astype(total.dtype)
         total = total + counts * mode.weight * found
         if plan.error_budget is None:
             return total, None, None
@@ -156,8 +161,9 @@ def _reflectance(
     # Without slopes a kernel for the mean alone is soon compiled, and a tenth faster than to ask in
     # each layer which mode it is.
     every = inputs.every_mode()
+    later, plan_of_later = lowered(inputs), lowered(plan)
     first = jax.tree.map(lambda x: x[0], every)
-    total = first.weight * reflection(True, first)
+    total = first.weight * reflection(True, first, inputs, plan)
     return over_modes(another, total, every, 1, None, plan)[0]
 
 

@@ -13,6 +13,8 @@ from ..method.bordered import Bordered
 from ..method.ground import black
 from ..method.layer import node_functions
 from ..method.mode_layers import Order
+from ..skipping import budget
+from ..skipping.plan import Plan
 from .mode import Kernels
 
 LATER = slice(1, None)
@@ -20,6 +22,11 @@ LATER = slice(1, None)
 WHOLE = 2
 """Nodes up to which all layers of all modes are one kernel: with more there is less to gain, and
 more than twice as much to compile."""
+
+
+def rounds(plan: Plan, num_nodes: int) -> bool:
+    """Whether values have all modes but the mean in single precision (`method.rounding`)."""
+    return num_nodes > WHOLE and budget.rounds(plan.error_budget)
 
 
 class How(NamedTuple):

@@ -1,12 +1,21 @@
-"""How much scattering without absorption single precision can tell from none.
+"""What single precision is enough for.
 
 A stack's admittance falls as one over its depth where nothing is absorbed (`adding`), and is there
 a difference of numbers of order 1. So its relative error is that of rounding times the depth:
 reflectances in single precision are right to 5e-4 at a depth of 1,000, and mean nothing from some
 30,000 on, where the difference has neither a right digit nor a sign. In double precision they are
 right to 1e-9 at 1e7.
+
+That is the azimuthal mean's alone: no other mode keeps energy. Where an error budget allows for it
+(`skipping.budget.SINGLE_FROM`), values have all others in single precision, which holds twice as
+many columns in a vector (`benchmarks/skipping.py`). Rounding grows there with a layer's depth, too,
+and nothing is seen as deep as `DEEPEST_ASIDE`, which no layer then exceeds: three layers of 1,000
+are right to 5e-5.
 """
 
+from typing import TypeVar
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -14,6 +23,10 @@ from jaxtyping import Array, Float
 # this, what lies deeper than a few hundred is not seen. [-]
 _CONSERVATIVE = 1e-5
 _DEEPEST = 1e4
+DEEPEST_ASIDE = 1e3
+"""Optical depth of a layer that looks like any deeper one in all modes but the mean. [-]"""
+
+Arrays = TypeVar("Arrays")
 
 
 def within_single_precision(
@@ -29,3 +42,13 @@ def within_single_precision(
     deep = jnp.sum(jnp.where(coalbedo < _CONSERVATIVE, tau, jnp.zeros_like(tau)), axis=0)
     number = tau.dtype.type  # which Python's numbers would not have
     return jnp.where(deep > number(_DEEPEST), number(jnp.nan), number(1))
+
+
+def as_deep_as_seen(tau: Float[Array, "layer *batch"]) -> Float[Array, "layer *batch"]:
+    """Optical depths as they count in modes but the mean. [-]"""
+    return jnp.minimum(tau, DEEPEST_ASIDE)
+
+
+def in_single_precision(arrays: Arrays) -> Arrays:
+    """The same with float32 for float64."""
+    return jax.tree.map(lambda x: x.astype(jnp.float32) if x.dtype == jnp.float64 else x, arrays)

@@ -8,7 +8,8 @@ where they count less than b times `OF_MODES`, and those but the mean are left o
 expected to be less than b times `OF_NO_MODES` (`mode_sum`). A layer's doublings leave b times
 `OF_DOUBLINGS` of its own response (`doublings`). These shares were fitted by
 `benchmarks/fit_budget.py` on columns of other seeds than those that `benchmarks/skipping.py` judges
-them by, so that the worst of five seeds leaves a third of the budget.
+them by, so that the worst of five seeds leaves a third of the budget. From `SINGLE_FROM` on modes
+of values but the mean are solved in single precision, which leaves next to nothing.
 
 Groups and modes are each column's own. Of doublings a layer has as many as that column of its tile
 asks for that needs most: what a column gets depends on those that it is solved with by about a
@@ -39,6 +40,8 @@ OF_NO_MODES = 0.1
 """Share of the budget below which all modes but the mean are expected to stay."""
 DECAY = 0.3
 """Ratio of neighbouring modes' sizes, to see a small one by chance for what it is."""
+SINGLE_FROM = 1e-4
+"""Budget from which values have all modes but the mean in single precision (`method.rounding`)."""
 OF_SLOPES = 2e-3
 """The budget of programs for slopes, at most: a column's slopes keep about 1 % whatever else."""
 THICKEST = 2.0
@@ -115,3 +118,8 @@ def expected(
     through = jnp.exp(-(1 / cosines[0] + 1 / cosines[1]) * jnp.sum(tau, axis=0))
     known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside, through)
     return jax.lax.stop_gradient(known)
+
+
+def rounds(error_budget: float | None) -> bool:
+    """Whether an error budget has room for single precision."""
+    return error_budget is not None and error_budget >= SINGLE_FROM

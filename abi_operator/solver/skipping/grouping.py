@@ -110,6 +110,8 @@ def grouped(alike: Alike, limits: Limits) -> Groups:
 
 def group_labels(alike: Alike, limits: Limits) -> Float[Array, "layer *batch"]:
     """Number of each layer's group."""
+    if alike.tau.shape[0] == 1:  # nothing to look at, of which no kernel can be made
+        return jnp.zeros_like(alike.tau)
     return one_kernel(_labels, 1)(*_without_slopes(alike, limits))
 
 

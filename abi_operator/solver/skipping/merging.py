@@ -35,30 +35,17 @@ def merged(
 
 
 def _merged(groups: Groups, tau, rows):
-    def add(layer, sums):
-        t = read(tau, layer)
-        x = t * read(rows, layer)
-        label = read(groups.labels, layer)
+    def mean(k, found):
+        def add(mine, layer, sums):
+            t = jnp.where(mine, read(tau, layer), 0)
+            return sums[0] + t, sums[1] + t * read(rows, layer)
 
-        def put(k, sums):
-            mine = label == k.astype(label.dtype)
-            depth, weighted = sums
-            return (
-                added_to(depth, k, jnp.where(mine, t, 0)),
-                added_to(weighted, k, jnp.where(mine, x, 0)),
-            )
-
-        return _for_groups_of(groups, layer, put, sums)
+        depth, weighted = _over_members(groups, k, add, tuple(read(x, k) for x in found))
+        return _put(found[0], k, depth), _put(found[1], k, weighted / depth)
 
     # Where a column has fewer groups than others, or nothing in one, the group is like the top.
     little = jnp.full_like(tau, _EMPTY), jnp.broadcast_to(_EMPTY * rows[:1], rows.shape)
-    depth, weighted = jax.lax.fori_loop(0, tau.shape[0], add, little)
-
-    def mean(k, weighted):
-        own = read(weighted, k) / read(depth, k)
-        return jax.lax.dynamic_update_index_in_dim(weighted, own, k, 0)
-
-    return depth, jax.lax.fori_loop(0, groups.number.astype(jnp.int32), mean, weighted)
+    return jax.lax.fori_loop(0, groups.number.astype(jnp.int32), mean, little)
 
 
 def summed(groups: Groups, x: Float[Array, "layer *batch"]) -> Float[Array, "layer *batch"]:
@@ -67,15 +54,13 @@ def summed(groups: Groups, x: Float[Array, "layer *batch"]) -> Float[Array, "lay
 
 
 def _summed(groups: Groups, x):
-    def add(layer, sums):
-        own, label = read(x, layer), read(groups.labels, layer)
+    def total(k, found):
+        def add(mine, layer, own):
+            return own + jnp.where(mine, read(x, layer), 0)
 
-        def put(k, sums):
-            return added_to(sums, k, jnp.where(label == k.astype(label.dtype), own, 0))
+        return _put(found, k, _over_members(groups, k, add, read(found, k)))
 
-        return _for_groups_of(groups, layer, put, sums)
-
-    return jax.lax.fori_loop(0, x.shape[0], add, jnp.zeros_like(x))
+    return jax.lax.fori_loop(0, groups.number.astype(jnp.int32), total, jnp.zeros_like(x))
 
 
 class Solved(NamedTuple):
@@ -160,6 +145,24 @@ def _inside(above, t, depth, upper, lower, mean):
     middle = (a + b) / 2
     curved = middle - (a * a + a * b + b * b) / 3
     return (1 - middle - 3 * curved) * upper + (middle - 3 * curved) * lower + 6 * curved * mean
+
+
+def _over_members(groups: Groups, k, body, carry) -> Any:
+    """``carry = body(mine, layer, carry)`` for the layers that belong to a group in some column of
+    the tile; `mine` tells in which. What is summed stays in few numbers, where to add to one of
+    many in memory takes twice as long."""
+    own = k.astype(groups.labels.dtype)
+    first = jnp.sum(groups.last < own, dtype=jnp.int32)
+    end = jnp.sum(groups.first <= own, dtype=jnp.int32)
+
+    def add(layer, carry):
+        return body(read(groups.labels, layer) == own, layer, carry)
+
+    return jax.lax.fori_loop(first, end, add, carry)
+
+
+def _put(stack, k, own):
+    return jax.lax.dynamic_update_index_in_dim(stack, own, k, 0)
 
 
 def _for_groups_of(groups: Groups, layer, body, carry) -> Any:

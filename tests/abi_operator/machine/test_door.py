@@ -34,7 +34,7 @@ class Waves:
     def widths(self, leaves, what):
         return 4, 16
 
-    def tile(self, leaves):
+    def tile(self, leaves, what):
         return 8
 
     def need(self, leaves):

@@ -75,7 +75,7 @@ class Program(NamedTuple):
     def widths(self, leaves, what):
         return TILE, 2 * TILE
 
-    def tile(self, leaves):
+    def tile(self, leaves, what):
         return TILE
 
     def need(self, leaves):

@@ -242,6 +242,17 @@ def test_layers_that_share_g_and_no_more_stay_apart():
     np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
 
 
+def test_one_layer_and_more_columns_than_a_tile():
+    """Columns are put in order by their groups, of which there is one."""
+    one = {k: x[:, :1] if np.ndim(x) > 1 else x for k, x in columns().items()}
+    order = np.arange(7)
+    given = one | {"moments": 0.7 ** order[None, None], "phase_function": np.ones((96, 1))}
+    within, whole = (
+        np.asarray(toa_brf(**given, num_streams=6, error_budget=x)) for x in (1e-3, None)
+    )
+    np.testing.assert_allclose(within, whole, rtol=1e-3)
+
+
 def test_no_group_is_thicker_than_it_may_be():
     tau, _ = layers()
     same = 0 * tau + 0.9
