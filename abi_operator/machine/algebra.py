@@ -21,7 +21,9 @@ from .backend import on_cpu
 from .plain import is_plain
 
 _WRITTEN_OUT = 16  # longest sum of a matrix product that is written out
-_IN_PARTS = range(5, 9)  # such sums are two operations in float32
+# Terms of each operation of a sum in float32, none of which has more arithmetic than bytes.
+_IN_PARTS = {5: (2, 3), 6: (3, 3), 7: (3, 4), 8: (4, 4)}
+_IN_PARTS |= {9: (3, 3, 3), 10: (3, 4, 3), 11: (3, 4, 4), 12: (3, 5, 4)}
 
 
 def converted(x: Any, dtype: Any) -> Any:
@@ -124,17 +126,22 @@ def product(
 
     A short sum over `inner` is written out: a chain of fused multiply-adds on whole batches, five
     to ten times faster than a batched ``dot`` on matrices of 2 to 8 rows. From 16 on the ``dot`` is
-    faster, and written-out sums would take minutes to compile. In float32 sums of 5 to 8 terms come
-    in two operations, neither of which has more arithmetic than bytes: what that is good for stands
-    in `kernels.one_kernel`.
+    faster, and written-out sums would take minutes to compile. In float32 sums of 5 to 12 terms
+    come in two or three operations, none of which has more arithmetic than bytes: what that is good
+    for stands in `kernels.one_kernel`.
     """
     inner = a.shape[1]
     if inner > _WRITTEN_OUT:
         b = b.joined() if isinstance(b, Rows) else b
         return jnp.einsum("ik...,kj...->ij...", a, b, precision=jax.lax.Precision.HIGHEST)
+    terms, before = _terms(a, b), []
     if inner in _IN_PARTS and a.dtype == jnp.float32:
-        return total([_first_half(a, b), *_terms(a, b)[inner // 2 :]])
-    return total(_terms(a, b))
+        start = 0
+        for count in _IN_PARTS[inner][:-1]:
+            before = [_sum_of_some(before, a, b, slice(start, start + count))]
+            start += count
+        terms = terms[start:]
+    return total([*before, *terms])
 
 
 def _terms(a, b):
@@ -143,9 +150,8 @@ def _terms(a, b):
     return [a[:, k, None] * row[None] for k, row in enumerate(rows)]
 
 
-@fenced
-def _first_half(a, b):
-    return total(_terms(a, b)[: a.shape[1] // 2])
+def _sum_of_some(before, a, b, some):
+    return fenced(lambda before, a, b: total([*before, *_terms(a, b)[some]]))(before, a, b)
 
 
 def kernel_of_product(function: Callable, inner: int) -> Callable:

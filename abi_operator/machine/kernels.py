@@ -21,7 +21,7 @@ from jax.interpreters import partial_eval as pe
 from .plain import is_plain
 
 # Rows of matrices up to which a layer is one kernel: see `one_kernel`.
-_LARGEST, _LARGEST_OF_FLOAT32 = 8, 4
+_LARGEST, _LARGEST_OF_FLOAT32, _LARGEST_IN_PARTS = 8, 4, 12
 
 # Bytes from which on XLA shares an operation among threads; not those that only move or hold data.
 _SHARED_FROM = 2**19
@@ -39,12 +39,13 @@ def one_kernel(
     XLA has neither code in it for a ``dot`` nor for an operation that it would share among threads,
     and does not compile a program with one: an operation on half a megabyte, or of more arithmetic
     than bytes on 20 kilobytes. With the tiles of `batching` there is none of the second kind up to
-    8 rows in float64, nor up to 4 in float32, whose bytes are half as many (8 where sums come
-    `in_parts`). A function of larger ones is not marked, but one call all the same: taken apart, in
-    a loop over layers, its parts that need the layer alone would be computed for all layers ahead
-    and read one by one, by a hundred kernels. A function with an operation of the first kind (of
-    very many layers) is left as it is, and so are derivatives of `function` and what `jax.vmap`
-    makes of it, in which nobody has counted.
+    8 rows in float64, nor up to 4 in float32, whose bytes are half as many (12 of both where sums
+    come `in_parts`: with 10, the rows of 20 streams, a value then takes 0.65 of the time, and half
+    as long again to compile). A function of larger ones is not marked, but one call all the same:
+    taken apart, in a loop over layers, its parts that need the layer alone would be computed for
+    all layers ahead and read one by one, by a hundred kernels. A function with an operation of the
+    first kind (of very many layers) is left as it is, and so are derivatives of `function` and what
+    `jax.vmap` makes of it, in which nobody has counted.
 
     Nor does XLA compile a kernel with an argument that is of no use in it (the process ends with
     "All or none of the slices should have an explicit index"). Arguments that `function` does not
@@ -58,8 +59,8 @@ def one_kernel(
     num_nodes
         Rows of the matrices.
     in_parts
-        Whether no operation in float32 has more arithmetic than bytes, either, because long sums
-        come in parts (`algebra.product`, `algebra.weighted_sum`).
+        Whether no operation has more arithmetic than bytes, because long sums come in parts
+        (`algebra.product`, `algebra.weighted_sum`).
     """
 
     def call(*args: Any) -> Any:
@@ -85,8 +86,10 @@ def one_kernel(
 
 def small_enough(num_nodes: int, dtype: Any, in_parts: bool = False) -> bool:
     """Whether matrices with so many rows can be in one kernel; see there for the arguments."""
+    if in_parts:
+        return num_nodes <= _LARGEST_IN_PARTS
     double = jnp.dtype(dtype) == jnp.float64
-    return num_nodes <= (_LARGEST if double or in_parts else _LARGEST_OF_FLOAT32)
+    return num_nodes <= (_LARGEST if double else _LARGEST_OF_FLOAT32)
 
 
 def _largest_operation(jaxpr: Any) -> int:
