@@ -1,5 +1,6 @@
 """Levels at the edges of plumes, so that no layer is partly inside of one."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -8,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .atmosphere import Atmosphere
+from .atmosphere import Atmosphere, State
 
 
 def with_plume_edges(atmosphere: Atmosphere) -> Atmosphere:
@@ -46,6 +47,25 @@ def with_plume_edges(atmosphere: Atmosphere) -> Atmosphere:
     for _ in range(atmosphere.height.ndim - 1):
         function = jax.vmap(function)
     return function(atmosphere)
+
+
+def moves_plume_edges(changed: Callable[[Array], State], size: int) -> bool:
+    """Whether the base or the top of any plume depends on so many numbers.
+
+    Parameters
+    ----------
+    changed
+        From these numbers to a column, or a batch; its slopes are looked at where all are 0.1.
+    size
+        How many numbers.
+    """
+
+    def edges(x: Float[Array, " x"]) -> list[Array]:
+        plumes = changed(x).atmosphere.plumes
+        return [edge for plume in plumes.values() for edge in (plume.base, plume.top)]
+
+    slopes = jax.jacfwd(edges)(jnp.full(size, 0.1))
+    return any(bool(np.any(np.asarray(slope))) for slope in slopes)
 
 
 def _with_edges(atmosphere: Atmosphere) -> Atmosphere:

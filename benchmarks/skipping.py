@@ -30,22 +30,24 @@ from abi_operator.solver.skipping import budget, company
 FIRST_SEED = 1000
 GRADIENT_BUDGET = 1e-2
 LEAST_BRF = 0.01
-# Shares of the budget with which a kind of skipping leaves nothing out.
+# Shares of the budget, and the least of it, with which a kind of skipping leaves nothing out.
 NOTHING = {
     "OF_MERGING": -1.0,
     "OF_MODES": 1e-12,
     "OF_NO_MODES": -1.0,
     "OF_MODES_OF_SLOPES": 1e-12,
     "OF_DOUBLINGS": 1e-6,
+    "SINGLE_FROM": np.inf,
 }
 MODES = {"OF_MODES", "OF_NO_MODES", "OF_MODES_OF_SLOPES"}
 
 # What each row does without.
 ROWS = {
     "nothing left out": None,
-    "layers that are alike": {*MODES, "OF_DOUBLINGS"},
-    "azimuth modes": {"OF_MERGING", "OF_DOUBLINGS"},
-    "doublings": {"OF_MERGING", *MODES},
+    "layers that are alike": {*MODES, "OF_DOUBLINGS", "SINGLE_FROM"},
+    "azimuth modes": {"OF_MERGING", "OF_DOUBLINGS", "SINGLE_FROM"},
+    "doublings": {"OF_MERGING", *MODES, "SINGLE_FROM"},
+    "single precision": {"OF_MERGING", *MODES, "OF_DOUBLINGS"},
     "all, columns as they come": {"order"},
     "all": set(),
 }

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from abi_operator import State
+from abi_operator.plume_edges import moves_plume_edges
 
 from .prior import Prior
 from .quantities import Derived, Quantity, part, with_part
@@ -94,13 +95,7 @@ class StateVector:
     def moves_plumes(self, states: State) -> bool:
         """Whether x moves the base or the top of a plume of such columns."""
         first = jax.tree.map(lambda leaf: leaf[:1], states)
-
-        def edges(x: Float[Array, " x"]) -> list[Array]:
-            plumes = self.state(x[None], first).atmosphere.plumes
-            return [edge for plume in plumes.values() for edge in (plume.base, plume.top)]
-
-        slopes = jax.jacfwd(edges)(jnp.full(self.size, 0.1))
-        return any(bool(np.any(np.asarray(slope))) for slope in slopes)
+        return moves_plume_edges(lambda x: self.state(x[None], first), self.size)
 
     def held(self, state: State, name: str) -> Array:
         """Value of a quantity that a state holds itself: the truth, or what is thought of it.

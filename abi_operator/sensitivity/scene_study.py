@@ -11,12 +11,13 @@ import xarray as xr
 from ..atmosphere import Fire, State
 from ..files import InputError
 from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
+from ..plume_edges import moves_plume_edges
 from ..scene import column_states, gases_of, species_of
 from ..scene.angles import sun_distance
 from ..settings import Settings
 from .declarations import declared
 from .derivatives import Function, Sensitivity, sensitivity
-from .inputs import Input
+from .inputs import Input, changed
 from .outputs import FIRE_CONTRAST, bands_of, check_outputs, output_function
 from .study_dataset import SampledPixels, study_dataset
 from .variance import covariance_of, sampled_variance
@@ -27,7 +28,6 @@ some 1e-4 of sunlight in C06. [K]"""
 DEFAULT_FIRE = Fire(0.04, 800.0)  # pyright: ignore[reportArgumentType]
 """One cell of 400 m in a pixel of 2 km."""
 
-_OF_EDGES = "plume_height", ".base", ".top"  # how names of inputs end that move a plume's edges
 _DARK = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 
 
@@ -117,7 +117,8 @@ def sensitivity_study(
             chosen = chosen_pixels(image, species, where)
             states = states_of(image, chosen, of, fire)
             how = settings_of_result(image)
-            if any(one.name.endswith(_OF_EDGES) for one in inputs):
+            first = jax.tree.map(lambda leaf: leaf[:1], states)
+            if moves_plume_edges(lambda x: changed(first, inputs, x[None]), len(inputs)):
                 how = how._replace(plume_edges=True)
             function = output_function(of, how, sun_distance_of(image))
             found = sensitivity(function, states, inputs, second_order=second_order)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from columns_of_smoke import burning, columns
 
+from abi_operator.plume_edges import moves_plume_edges
 from abi_operator.sensitivity import declared, factor, leaf
 from abi_operator.sensitivity.declarations import BY_BAND, SHORT_NAMES
 from abi_operator.sensitivity.inputs import changed, part
@@ -68,3 +69,19 @@ def test_what_there_is_not_is_told(states):
         declared("ssa", "dust").change(states, jnp.zeros(6))
     with pytest.raises(ValueError, match="a step is above 0; got 0"):
         declared("albedo").stepping(0.0)
+
+
+@pytest.mark.parametrize(
+    "ours",
+    [
+        declared("plume_height", "smoke"),
+        *(leaf(f"atmosphere.plumes.smoke.{end}", 100.0, name="mine") for end in ("base", "top")),
+    ],
+)
+def test_what_moves_a_plume_is_told_by_what_it_does(states, ours):
+    others = [declared(name, "smoke") for name in ("aod_550", "ssa", "solar_zenith")]
+    first = jax.tree.map(lambda x: x[:1], states)
+    for inputs, moves in ((others, False), ([*others, ours], True)):
+        assert (
+            moves_plume_edges(lambda x, i=inputs: changed(first, i, x[None]), len(inputs)) is moves
+        )
