@@ -14,7 +14,7 @@ from retrievals.experiments.independent_plumes import RADII_UM, independent_plum
 def test_a_covariance_of_the_forward_model_widens_the_error_bars():
     table = independent_truth(size=6, seed=1, kinds=["smoke"], true_streams=4, num_streams=2)
     assert (table["num_pixels"] >= 35).all()
-    before, after = (table["coverage_68"].sel(S_obs=name) for name in table["S_obs"].values)
+    before, after, _ = (table["coverage_68"].sel(S_obs=name) for name in table["S_obs"].values)
     assert (before < 0.6).all() and (after > before + 0.2).all()
     sigma = table["sigma"]
     assert (sigma.isel(S_obs=1) > sigma.isel(S_obs=0)).mean() > 0.9
