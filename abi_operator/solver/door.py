@@ -132,7 +132,8 @@ class _Program(NamedTuple):
         return tile_size(self.options.num_streams, dtype, self._rounds(what))
 
     def _rounds(self, what: Any) -> bool:
-        return what == "value" and budget.rounds(self.options.error_budget)
+        options = self.options
+        return what == "value" and options.delta_m and budget.rounds(options.error_budget)
 
     def need(self, leaves: Leaves) -> Array | None:
         return need(self._aligned(leaves), self.options) if self._in_order else None

@@ -103,7 +103,7 @@ class Problem:
             grounds=others,
             weights=sign * jnp.cos(order.astype(azimuth.dtype) * azimuth),
         )
-        how = How(not options.tms, options.error_budget, options.num_doublings)
+        how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
         if options.error_budget is None:
             return mode_sum(inputs, self.doublings, how)
         known = expected_of(self.column, layers, self.directions, rest)

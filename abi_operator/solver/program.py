@@ -113,7 +113,7 @@ def radiance_of_one_view(column: Column, options: Options) -> Float[Array, "*bat
     skips = options.error_budget is not None and not isinstance(column.albedo, AnySurface)
     if skips and not cold:
         given = given._replace(warm=warm_of(column, problem.layers, problem.directions, at_once))
-    how = How(not options.tms, options.error_budget, options.num_doublings)
+    how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
     return at_top + sun * at_once[0] + radiance(lit, given, how)
 
 

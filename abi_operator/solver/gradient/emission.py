@@ -36,7 +36,7 @@ from .emitting_mode import (
     slope_of_light_from_above,
     slopes_of_mode,
 )
-from .modes import LATER, WHOLE, How, Mode, along, every_mode, rounds
+from .modes import LATER, WHOLE, How, Mode, along, every_mode
 from .room import Keeper
 
 
@@ -93,7 +93,7 @@ def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     added = jnp.zeros_like(lit.heating.above)
     if plan.groups is not None:
         lit, added = _in_groups(lit, given.warm, plan)
-    value = partial(_radiance, single_scattering=how.single_scattering)
+    value = partial(_radiance, how=how)
     return added + (one_kernel(value, num_nodes) if num_nodes <= WHOLE else value)(lit, plan)
 
 
@@ -127,24 +127,23 @@ def _in_groups(lit: Lit, warm: Warm | None, plan: Plan) -> tuple[Lit, Float[Arra
     return lit._replace(air=air, heating=heating), added
 
 
-def _radiance(lit: Lit, plan: Plan, single_scattering: bool) -> Float[Array, "*batch"]:
-    how = plan, single_scattering
+def _radiance(lit: Lit, plan: Plan, how: How) -> Float[Array, "*batch"]:
     every = _every(lit)
     first = jax.tree.map(lambda x: x[0], every)
     light, one = _of_ground(lit), _one(lit)
-    stack, light = _stacked(lit, first, lit.ground, light, *how)
+    stack, light = _stacked(lit, first, lit.ground, light, plan, how)
     assert light is not None
     closed, nothing = top(stack), jnp.zeros_like(lit.heating.above)
     emitted = closed.emerging(light, one, 0.5 * lit.heating.above, nothing)[1]
     mean = first.weight * closed.reflection()[0] + emitted
 
-    lowered = in_single_precision if rounds(plan, _num_nodes(lit)) else lambda x: x
+    lowered = in_single_precision if how.rounds(plan, _num_nodes(lit)) else lambda x: x
     later, plan_of_later = lowered(lit), lowered(plan)
 
     def plus(total, mode, counts):
         own = lowered(mode)
         ground = own.below(later.ground, mean=False)
-        stack, _ = _stacked(later, own, ground, None, plan_of_later, single_scattering)
+        stack, _ = _stacked(later, own, ground, None, plan_of_later, how)
         reflection = top(stack).reflection()[0].astype(total.dtype)
         found = counts * mode.weight * reflection
         total = total + found
@@ -160,17 +159,17 @@ def _stacked(
     ground: Bordered,
     light: Emission | None,
     plan: Plan,
-    single_scattering: bool,
+    how: How,
 ) -> tuple[Bordered, Emission | None]:
     """All layers of a mode on the ground; only the mean has thermal light."""
-    rounded = rounds(plan, _num_nodes(lit))
+    rounded = how.rounds(plan, _num_nodes(lit))
 
     def put_on(below, air, jumps, doublings, odd, kernels, one, *number):
         # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
         place = number[0] if number else jnp.zeros_like(odd)
         layer, (stack, light) = air.layers.layer(place, odd), below
         view_secant = read(air.view_secants, place)
-        a, p = layer.matrices(light is not None, kernels, view_secant[None], single_scattering)
+        a, p = layer.matrices(light is not None, kernels, view_secant[None], how.single_scattering)
         own = jax.tree.map(lambda x: read(x, place), doublings)
         tau = as_deep_as_seen(layer.tau) if rounded and light is None else layer.tau
         y, z = half_layer(a, p, tau, own)

@@ -23,7 +23,7 @@ from ..skipping import budget
 from ..skipping.budget import Expected
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .mode import Shared, mode_slopes
-from .modes import LATER, WHOLE, How, Mode, along, every_mode, rounds
+from .modes import LATER, WHOLE, How, Mode, along, every_mode
 from .room import Keeper
 
 
@@ -100,8 +100,8 @@ def mode_sum(inputs: ModeSum, given: Given, how: How) -> Float[Array, "view *bat
     forward and reverse mode, and slopes that nobody asks for are not computed.
     """
     plan = _plan(inputs, given, how)
-    value = partial(_reflectance, single_scattering=how.single_scattering)
     num_nodes = inputs.num_nodes
+    value = partial(_reflectance, how=how)
     return (one_kernel(value, num_nodes) if num_nodes <= WHOLE else value)(inputs, plan)
 
 
@@ -116,11 +116,9 @@ def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan
     return planned(inputs.layers, inputs.view_secants, given, error_budget, how.most, thickest)
 
 
-def _reflectance(
-    inputs: ModeSum, plan: Plan, single_scattering: bool
-) -> Float[Array, "view *batch"]:
+def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *batch"]:
     num_nodes = inputs.num_nodes
-    rounded = rounds(plan, num_nodes)
+    rounded = how.rounds(plan, num_nodes)
     lowered = in_single_precision if rounded else lambda x: x
 
     def reflection(mean: bool, mode: Mode, inputs: ModeSum, plan: Plan) -> Array:
@@ -128,7 +126,7 @@ def _reflectance(
             # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
             place = number[0] if number else jnp.zeros_like(odd)
             layer = layers.layer(place, odd)
-            a, p = layer.matrices(mean, kernels, view_secants, single_scattering)
+            a, p = layer.matrices(mean, kernels, view_secants, how.single_scattering)
             own = jax.tree.map(lambda x: read(x, place), doublings)
             tau = as_deep_as_seen(layer.tau) if rounded and not mean else layer.tau
             return add_layer(stack, *half_layer(a, p, tau, own), tau)

@@ -24,11 +24,6 @@ WHOLE = 2
 more than twice as much to compile."""
 
 
-def rounds(plan: Plan, num_nodes: int) -> bool:
-    """Whether values have all modes but the mean in single precision (`method.rounding`)."""
-    return num_nodes > WHOLE and budget.rounds(plan.error_budget)
-
-
 class How(NamedTuple):
     """What is static in a sum over modes.
 
@@ -40,11 +35,18 @@ class How(NamedTuple):
         Relative error of the light that may be made (`skipping`); None solves everything.
     most
         Doublings of a layer, at most: slopes have room for so many. None sets no limit to values.
+    delta_m
+        Whether forward peaks are scaled away.
     """
 
     single_scattering: bool
     error_budget: float | None
     most: int | None
+    delta_m: bool = True
+
+    def rounds(self, plan: Plan, num_nodes: int) -> bool:
+        """Whether values have all modes but the mean in single precision (`method.rounding`)."""
+        return self.delta_m and num_nodes > WHOLE and budget.rounds(plan.error_budget)
 
 
 class Mode(NamedTuple):

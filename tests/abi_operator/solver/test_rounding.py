@@ -61,6 +61,19 @@ def test_layers_deeper_than_anything_that_is_seen(depth, ssa):
     np.testing.assert_allclose(rounded, double, rtol=BUDGET / 4)  # 6e-4 and more if they were
 
 
+def test_peaks_that_are_cut_off_stay_in_double_precision():
+    """Without delta-M no matrix is sure to be positive in single precision."""
+    rough = columns() | {
+        "tau": np.full((64, 3), 10.0),
+        "moments": np.full((64, 3, 1), 0.9) ** ORDER,
+    }
+    brf, whole = (
+        np.asarray(toa_brf(**rough, num_streams=STREAMS, delta_m=False, error_budget=x))
+        for x in (BUDGET, None)
+    )
+    np.testing.assert_allclose(brf, whole, rtol=1e-6)  # 6e-5 and more if they were not
+
+
 def test_only_what_is_double_changes():
     given = jnp.asarray([0.1, np.nan]), jnp.arange(2), jnp.float32(3)
     double, integers, single = in_single_precision(given)
