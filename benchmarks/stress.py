@@ -6,15 +6,15 @@
 Columns are those of `stress_columns`, checks those of `stress_checks`. Streams are 2 to 8 in 95 %
 of the columns, 16 in 4.5 %, 32 in 0.45 %, 64 in 0.05 %; layers up to 1, 4, 16, 64 and 200. Each
 batch is a file of the folder, made from its name alone: a run that was stopped goes on with what
-is missing, and the bytes are the same. The folder has one in it for each state of the code. Every
-core has a process of its own. The worst columns are solved with 40 digits (`stress_truth`).
+is missing, and the bytes are the same. The folder has one in it for each state of the code that
+figures hang on (`stress_code`). Every core has a process of its own. The worst columns are solved
+with 40 digits (`stress_truth`).
 
 `--columns 1000000` is the long run; how long it would take is printed, but for compiling, which is
 done once. Exits with 1 where a check failed.
 """
 
 import argparse
-import hashlib
 import os
 import sys
 import tempfile
@@ -26,10 +26,10 @@ import jax
 import numpy as np
 import stress_truth
 from stress_checks import CHECKS, Judged, refused
+from stress_code import state_of_code
 from stress_columns import SEED, draw
 from stress_report import GROUPS, PRECISIONS, SIGNS, by_check, by_stratum, described, failed, worst
 
-import abi_operator
 from abi_operator import use_compilation_cache
 from abi_operator.machine.speed import usable_cores
 
@@ -87,16 +87,6 @@ def judge(task):
         os.replace(part, path)
         seconds.append(time.perf_counter() - started)
     return group, seconds
-
-
-def state_of_code():
-    """Name of a folder: results of other code are other results."""
-    code = hashlib.sha256()
-    sources = sorted(Path(abi_operator.__file__).parent.rglob("*.py"))
-    own = [Path(__file__).with_name(f"stress_{name}.py") for name in ("columns", "checks")]
-    for path in [*sources, *own]:
-        code.update(path.read_bytes())
-    return code.hexdigest()[:12]
 
 
 def run(folder, columns, precision, groups):
