@@ -40,6 +40,8 @@ COMMANDS = "abi_operator.commands"
 
 # Albedo of the sea in the demonstration. [-]
 _DEMO_OCEAN_ALBEDO = 0.03
+# Streams of the solver there. [-]
+_DEMO_STREAMS = 8
 
 _NO_CACHE = "--no-cache"
 _NO_CACHE_HELP = "Use and keep no compiled programs; also behind a command's name."
@@ -69,7 +71,8 @@ def demo(
         with output_folder(out, outdated=partial(pictures_of_before, out)) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
             # As in the paper, which neglects absorption by gases. Nothing is left out, since the
-            # retrieval is to find the very optical depths that made the image.
+            # retrieval is to find the very optical depths that made the image; and few streams, as
+            # most of a first run is compiling.
             request = Request(
                 inputs.wrf,
                 inputs.albedo,
@@ -78,6 +81,7 @@ def demo(
                 plume_species=plume,
                 bands=GRASSO2013 if plume == Species.SMOKE else (*GRASSO2013, "green"),
                 gases=(),
+                num_streams=_DEMO_STREAMS,
                 error_budget=None,
             )
             request = request._replace(command=typed(context))

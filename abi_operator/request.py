@@ -10,6 +10,7 @@ from .bands import GRASSO2013
 from .files.stored import ALL
 from .optics import ALL_GASES
 from .scene import ERROR_BUDGET, DropletNumber, Emissivity, IceAlbedo, LandAlbedo, OceanWind
+from .settings import NUM_STREAMS
 
 
 class Species(StrEnum):
@@ -88,7 +89,7 @@ class Request(NamedTuple):
     satellite: str = "GOES-16"
     satellite_longitude: float | None = None
     time: int | str | None = None
-    num_streams: float = 8
+    num_streams: float = NUM_STREAMS
     error_budget: float | None = ERROR_BUDGET
     land_albedo: LandAlbedo | None = None
     sea_ice_albedo: IceAlbedo | None = None

@@ -19,6 +19,7 @@ from .microphysics import SCHEMES
 from .optics import ALL_GASES
 from .satellites import SATELLITES
 from .scene import CLASSES, ERROR_BUDGET, DropletNumber
+from .settings import NUM_STREAMS
 from .simulation import Report, Request, Species, open_scene, pictures_of_before, simulate_scene
 from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
 
@@ -214,7 +215,7 @@ def simulate(
             "slower. Or the error that they may leave in 99 of 100 pixels, such as 0.5%, by which "
             "each pixel has as many as clear air, plumes or cloud need.",
         ),
-    ] = "8",
+    ] = str(NUM_STREAMS),
     error_budget: Annotated[
         float,
         typer.Option(

@@ -1,11 +1,13 @@
 """Where the time of a scene goes: reading, optics, solving, writing.
 
-    python benchmarks/first_light.py [--size 64] [--num-streams 8] [--repeats 5]
+    python benchmarks/first_light.py [--size 64] [--num-streams 10] [--error-budget 1e-3]
+        [--repeats 5]
 
 writes the demonstration's inputs, takes them through each stage by itself and prints, for every
 stage, the seconds of the first call (compiling included) and the median of `repeats` further ones
-with their spread, on the same arrays. Beside the time stands the error of the solver's setting: the
-brf of 128 columns of the same scene against 32 streams.
+with their spread, on the same arrays. Streams and error budget are those of a scene unless told
+otherwise; a budget of 0 solves everything. Beside the time stands the error of both: the brf of 128
+columns of the same scene against 32 streams.
 """
 
 import argparse
@@ -34,7 +36,14 @@ from abi_operator.machine.speed import usable_cores
 from abi_operator.optics import column_optics
 from abi_operator.pictures import write_png
 from abi_operator.products import natural_color
-from abi_operator.scene import PlumeSpecification, column_states, scenario, simulate
+from abi_operator.scene import (
+    ERROR_BUDGET,
+    PlumeSpecification,
+    column_states,
+    scenario,
+    simulate,
+)
+from abi_operator.settings import NUM_STREAMS
 from abi_operator.solver import cos_scattering_angle, toa_brf
 
 OCEAN_ALBEDO = 0.03
@@ -73,7 +82,7 @@ def optics(states, num_moments):
     return jax.vmap(column)(states)
 
 
-def solve(states, layers, num_streams):
+def solve(states, layers, how):
     """Layers to brf."""
     tau, ssa, moments, phase = layers
     albedo = np.stack([states.albedo[name] for name in GRASSO2013], axis=1)
@@ -81,9 +90,7 @@ def solve(states, layers, num_streams):
     directions = [
         np.asarray(x)[:, None] for x in (geometry.mu0, geometry.mu, geometry.relative_azimuth)
     ]
-    return toa_brf(
-        tau, ssa, moments, albedo, *directions, num_streams=num_streams, phase_function=phase
-    )
+    return toa_brf(tau, ssa, moments, albedo, *directions, phase_function=phase, **how)
 
 
 def write(result, folder):
@@ -109,10 +116,12 @@ def timed(function, repeats):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--size", type=int, default=64)
-    parser.add_argument("--num-streams", type=int, default=8)
+    parser.add_argument("--num-streams", type=int, default=NUM_STREAMS)
+    parser.add_argument("--error-budget", type=float, default=ERROR_BUDGET)
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
+    how = {"num_streams": options.num_streams, "error_budget": options.error_budget or None}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         inputs = write_demo(folder, size=options.size)
@@ -121,10 +130,8 @@ def main():
         states = column_states(scene, GRASSO2013)
         moments = options.num_streams + 1
         *rows["optics"], layers = timed(lambda: optics(states, moments), options.repeats)
-        *rows["solving"], values = timed(
-            lambda: solve(states, layers, options.num_streams), options.repeats
-        )
-        result = simulate(scene, num_streams=options.num_streams)
+        *rows["solving"], values = timed(lambda: solve(states, layers, how), options.repeats)
+        result = simulate(scene, **how)
         *rows["writing"], _ = timed(lambda: write(result, folder), options.repeats)
     every = np.linspace(0, values.shape[0] - 1, REFERENCE_COLUMNS).astype(int)
     few = jax.tree.map(lambda x: x[every], states)
@@ -141,7 +148,7 @@ def main():
         f"{layers_count} layers, ",
         end="",
     )
-    print(f"{options.num_streams} streams\n")
+    print(f"{options.num_streams} streams, error budget {how['error_budget']}\n")
     whole = sum(median for _, median, _ in rows.values())
     print("| stage | first call [s] | median [s] | range [s] | share | columns x bands / s |")
     print("| --- | --- | --- | --- | --- | --- |")

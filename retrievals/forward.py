@@ -14,6 +14,7 @@ from abi_operator.instrument import reflectance_factor_from_radiance
 from abi_operator.machine.sizes import chunk_of_pixels_to_read
 from abi_operator.machine.speed import Kept
 from abi_operator.optics import ALL_GASES, column_optics
+from abi_operator.settings import NUM_STREAMS
 from abi_operator.solver import sufficient_doublings
 
 from .chunks import map_chunks
@@ -50,7 +51,7 @@ class ForwardModel:
 
     vector: StateVector
     bands: tuple[str, ...]
-    num_streams: int = 8
+    num_streams: int = NUM_STREAMS
     num_doublings: int | None = None
     gases: tuple[str, ...] = ALL_GASES
     satellite: str = "GOES-16"

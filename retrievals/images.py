@@ -13,6 +13,7 @@ from abi_operator.files import InputError
 from abi_operator.instrument import IMAGER
 from abi_operator.nomenclature import PLUME, SCENARIO
 from abi_operator.scene import column_states, gases_of
+from abi_operator.settings import NUM_STREAMS
 
 from .forward import ForwardModel, prepared
 from .intervals import posterior_intervals
@@ -195,15 +196,20 @@ def forward_model(
     dataset: xr.Dataset, vector: StateVector, bands: tuple[str, ...], num_streams: int | None
 ) -> ForwardModel:
     """The operator as a result was simulated by it; streams are those of the result for None."""
-    if num_streams is None:
-        num_streams = streams_of(dataset)
-    satellite = str(dataset.attrs.get("satellite", IMAGER.satellite))
-    return ForwardModel(vector, bands, num_streams, gases=gases_of(dataset), satellite=satellite)
+    budget = dataset.attrs.get("error_budget")
+    return ForwardModel(
+        vector,
+        bands,
+        streams_of(dataset) if num_streams is None else num_streams,
+        gases=gases_of(dataset),
+        satellite=str(dataset.attrs.get("satellite", IMAGER.satellite)),
+        error_budget=None if budget is None else float(budget),
+    )
 
 
 def streams_of(dataset: xr.Dataset) -> int:
     """Streams of the solver that made a result."""
-    return int(dataset.attrs.get("num_streams", 8))
+    return int(dataset.attrs.get("num_streams", NUM_STREAMS))
 
 
 def solved_whole(dataset: xr.Dataset) -> bool:

@@ -22,6 +22,7 @@ from ..files.mcd43 import KERNELS
 from ..geometry import Geometry
 from ..nomenclature import GROUND, PLUME
 from ..radiance import THERMAL
+from ..settings import NUM_STREAMS
 from .background import BY_BAND, QUANTITIES
 from .cloud_optics import cloud_optics_of, ice_optics_of
 from .grounds import land_and_sea
@@ -99,7 +100,7 @@ def column_states(
     )
     return State(
         atmosphere,
-        _grounds(reader, bands, num_streams or int(scenario.attrs.get("num_streams", 8))),
+        _grounds(reader, bands, num_streams or int(scenario.attrs.get("num_streams", NUM_STREAMS))),
         Geometry(**angles, spherical=spherical_somewhere(scenario, angles["solar_zenith"])),
         surface_temperature=reader.optional("surface_temperature"),
         fire=_fire(reader) if "fire_fraction" in scenario else None,

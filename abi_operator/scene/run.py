@@ -7,6 +7,7 @@ import xarray as xr
 
 from ..files import Parts
 from ..radiance import THERMAL
+from ..settings import NUM_STREAMS
 from .account import Attribute, add_accounts
 from .progress import Progress
 from .simulate import ERROR_BUDGET, simulate
@@ -35,7 +36,7 @@ def run(
     shape: tuple[int, int],
     write_block: WriteBlock,
     *,
-    num_streams: float = 8,
+    num_streams: float = NUM_STREAMS,
     error_budget: float | None = ERROR_BUDGET,
     block_columns: int = 16384,
     progress: bool = True,

@@ -19,6 +19,7 @@ from ..machine.sizes import chunks_to_read
 from ..nomenclature import variable
 from ..optics import aerosol, background, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
 from ..quality import flags_from
+from ..settings import NUM_STREAMS
 from .angles import sun_distance
 from .cloud_optics import cloud_optics_of, ice_optics_of, optics_attributes
 from .columns import column_states, horizontal
@@ -39,7 +40,7 @@ def simulate(
     *,
     bands: Sequence[str] | None = None,
     gases: Sequence[str] | None = None,
-    num_streams: float = 8,
+    num_streams: float = NUM_STREAMS,
     error_budget: float | None = ERROR_BUDGET,
     listener: Listener | None = None,
     parts: Parts | None = None,

@@ -75,7 +75,8 @@ def test_a_result_is_all_that_the_operator_needs(invoke, tmp_path):
     invoke("demo", "--size", SIZE, "--out", tmp_path)
     with read_result(tmp_path / "result.nc") as result:
         stored = result.isel(time=0).load()
-    again = scene.simulate(stored, error_budget=None)
+    streams = int(stored.attrs["num_streams"])
+    again = scene.simulate(stored, num_streams=streams, error_budget=None)
     for name in ("reflectance_factor", "smoke_aod_550"):
         np.testing.assert_array_equal(again[name], stored[name])
     for name in ("brf", "smoke_optical_depth"):  # which the file has in single precision
@@ -121,6 +122,7 @@ def test_simulate_does_what_demo_does(invoke, tmp_path, inputs):
     paths = {"--albedo": inputs.albedo, "--plume": inputs.plume, "--out": tmp_path / "out"}
     options = [word for option, path in paths.items() for word in (option, path)]
     options += ["--ocean-albedo", 0.03, "--gases", "none", "--error-budget", 0]
+    options += ["--num-streams", 8]
     outcome = invoke("simulate", inputs.wrf, *options)
     assert outcome.exit_code == 0, outcome.output
     invoke("demo", "--size", SIZE, "--out", tmp_path / "demo")

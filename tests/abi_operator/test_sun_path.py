@@ -56,7 +56,7 @@ def test_it_is_the_solver_with_the_secants_of_a_sphere():
         secant=secant,
         num_streams=8,
     )
-    found = brf(state, NAMES, gases=())[0, 0]
+    found = brf(state, NAMES, gases=(), num_streams=8)[0, 0]
     np.testing.assert_allclose(found, by_hand, rtol=1e-10)
 
 

@@ -9,6 +9,7 @@ from abi_operator.scene import column_states, gases_of, simulate
 from retrievals.declarations import plume
 from retrievals.declarations.plumes import height_shift
 from retrievals.forward import ForwardModel, prepared
+from retrievals.images import forward_model
 from retrievals.kinds import BANDS
 from retrievals.observation import observe
 from retrievals.state_vector import StateVector
@@ -70,6 +71,15 @@ def test_gases_and_ice_of_the_simulation_are_those_of_the_forward_model(make_sce
     without = replace(states, atmosphere=replace(states.atmosphere, gases=none))
     others = model(model.vector.x(truth), without)
     assert (np.abs(others - value)[:, 1] > 1e-3).all()  # ozone absorbs in C02
+
+
+def test_it_is_as_exact_as_what_made_the_image(make_scenario):
+    """Streams and error budget are those of the image; one that was solved whole has none."""
+    vector, made = plume("smoke"), make_scenario((0.3, 0.9))
+    whole, budget = (simulate(made, num_streams=2, error_budget=b) for b in (None, 1e-2))
+    assert forward_model(whole, vector, BANDS, None).error_budget is None
+    found = forward_model(budget, vector, BANDS, None)
+    assert (found.num_streams, found.error_budget) == (2, 1e-2)
 
 
 def test_prepared_doublings_suffice_at_the_limit(columns, forward):

@@ -97,7 +97,7 @@ def test_columns_are_solved_by_their_kind(make_scenario, kernels):
     for name in KERNELS:
         albedo[name].loc[{"lat": 33.2}] = 0.0  # one column of land without kernels
     made = make_scenario(albedo=albedo)
-    states = column_states(made, BANDS)
+    states = column_states(made, BANDS, num_streams=2)
     kinds = {type(some.albedo["C01"]): chosen for chosen, some in by_kind(states)}
     assert set(kinds) == {np.ndarray, RossLi, Ocean, LandAndSea}
     assert sum(chosen.sum() for chosen in kinds.values()) == 6
