@@ -141,6 +141,16 @@ def test_imports_stand_at_the_head_of_files():
                 assert not inner, f"{path}: {node.name} imports inside"
 
 
+LONGEST = 80  # lines of a function, with its docstring
+
+
+def test_functions_of_the_solver_are_short():
+    for path in [*sources("abi_operator/solver"), *sources("abi_operator/machine")]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                assert node.end_lineno - node.lineno < LONGEST, (path, node.name)
+
+
 def test_the_door_opens_with_jax_and_equinox_alone():
     heavy = ("xarray", "netCDF4", "pandas", "pyorbital", "PIL", "typer", "optimistix", "matplotlib")
     code = f"import sys, abi_operator; print([m for m in {heavy!r} if m in sys.modules])"

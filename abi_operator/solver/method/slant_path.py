@@ -1,4 +1,30 @@
-r"""The sun's path through layers on a sphere."""
+r"""The sun's path through layers on a sphere.
+
+It is one ray for the whole column, without refraction, and right for the beam at the ground
+alone. Light that is scattered higher up arrived on other rays, which are longer in the layers
+above: there the beam is too strong. Secants that are right at every level depend on the optical
+depths of all layers and can be negative; these do not, and are positive.
+
+In an atmosphere of scale height 8 km (100 km deep, layers of 250 m; exact paths by quadrature
+for every level) the paths to the ground and to 10 km, and the light that a vertical optical
+depth of 0.3 scatters once, isotropically, to the zenith, come out wrong by
+
+====== ====== ====== ========= ====== ====== =========
+\      these secants           1 / mu0
+------ ----------------------- -----------------------
+zenith ground 10 km  scattered ground 10 km  scattered
+====== ====== ====== ========= ====== ====== =========
+60 deg 0      -0.46% +0.057%   +0.37% +0.37% -0.095%
+75 deg 0      -2.0%  +0.49%    +1.7%  +1.7%  -0.73%
+80 deg 0      -4.4%  +1.5%     +3.8%  +3.7%  -2.1%
+85 deg 0      -13%   +8.5%     +13%   +13%   -9.6%
+====== ====== ====== ========= ====== ====== =========
+
+(0: below 2e-5), so that light scattered in the air gains little. The mean secant that `tau`
+asks for is as right at the ground; in this atmosphere it is wrong by 0.02% at 10 km and 0.011%
+in the scattered light at 85 degrees, and by less at the other angles. For layers that are not
+spread like air nothing was measured.
+"""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -36,36 +62,9 @@ def slant_path_secant(
     tau
         Optical depths, top first; with them all layers get the mean secant
         :math:`\sum_i s_i \tau_i / \sum_i \tau_i`, the better choice for light scattered in air
-        (see the notes). None for each layer's own. [-]
+        (see above). None for each layer's own. [-]
     radius
         Radius of the sphere. [m]
-
-    Notes
-    -----
-    This is one ray for the whole column, without refraction, and right for the beam at the ground
-    alone. Light that is scattered higher up arrived on other rays, which are longer in the layers
-    above: there the beam is too strong. Secants that are right at every level depend on the optical
-    depths of all layers and can be negative; these do not, and are positive.
-
-    In an atmosphere of scale height 8 km (100 km deep, layers of 250 m; exact paths by quadrature
-    for every level) the paths to the ground and to 10 km, and the light that a vertical optical
-    depth of 0.3 scatters once, isotropically, to the zenith, come out wrong by
-
-    ====== ====== ====== ========= ====== ====== =========
-    \      these secants           1 / mu0
-    ------ ----------------------- -----------------------
-    zenith ground 10 km  scattered ground 10 km  scattered
-    ====== ====== ====== ========= ====== ====== =========
-    60 deg 0      -0.46% +0.057%   +0.37% +0.37% -0.095%
-    75 deg 0      -2.0%  +0.49%    +1.7%  +1.7%  -0.73%
-    80 deg 0      -4.4%  +1.5%     +3.8%  +3.7%  -2.1%
-    85 deg 0      -13%   +8.5%     +13%   +13%   -9.6%
-    ====== ====== ====== ========= ====== ====== =========
-
-    (0: below 2e-5), so that light scattered in the air gains little. The mean secant that `tau`
-    asks for is as right at the ground; in this atmosphere it is wrong by 0.02% at 10 km and 0.011%
-    in the scattered light at 85 degrees, and by less at the other angles. For layers that are not
-    spread like air nothing was measured.
 
     References
     ----------
