@@ -72,7 +72,8 @@ def make_wrong(patch, owner, path):
 
 
 OBSERVED = {"observed_reflectance_factor", "softened_reflectance_factor"}
-SUNLIT = {"radiance", "quantised_radiance", "noise_deviation"} | OBSERVED
+COUNTED = {"quantised_radiance"}
+SUNLIT = {"radiance", "noise_deviation"} | COUNTED | OBSERVED
 PACKED = {"saturation_radiance", "quantised_radiance"}
 EMITTED = {"saturation_radiance", "brightness_temperature", "noise_deviation"}
 EMITTED |= {"observed_brightness_temperature", "softened_brightness_temperature"}
@@ -80,7 +81,8 @@ COLOURS = ("C01", "C02", "C03")
 STRETCHED = {"natural_color"}
 # The bands looked at, where the number is that is wrong, and first words of what moves.
 FAULTS = {
-    "sun in C01": (("C01",), (SATELLITE, "_SOLAR_IRRADIANCE", "GOES-16", "C01"), SUNLIT),
+    # Counts of C01, which has 10 bits, lie further apart than that moves any column's radiance.
+    "sun in C01": (("C01",), (SATELLITE, "_SOLAR_IRRADIANCE", "GOES-16", "C01"), SUNLIT - COUNTED),
     "sun in C03": (("C03",), (SATELLITE, "_SOLAR_IRRADIANCE", "GOES-16", "C03"), SUNLIT),
     "step of C05": (("C05",), (SATELLITE, "_PACKING", "C05", "scale"), PACKED | OBSERVED),
     "noise of C04": (("C04",), (NOISE, "floor", "C04"), {"noise_deviation"}),
