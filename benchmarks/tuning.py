@@ -124,9 +124,7 @@ def mie_world(image, radius):
     air = replace(states.atmosphere, plumes={"smoke": spheres})
     states = replace(states, atmosphere=air)
     mu0 = np.cos(np.asarray(states.geometry.solar_zenith))
-    factor = (
-        np.asarray(brf(states, bands, gases=(), num_streams=WHOLE["num_streams"])) * mu0[:, None]
-    )
+    factor = np.asarray(brf(states, bands, gases=(), **WHOLE)) * mu0[:, None]
     shape = image["reflectance_factor"].shape
     values = np.moveaxis(factor.reshape(*shape[1:], len(bands)), -1, 0)
     ratio = values / image["reflectance_factor"]
