@@ -41,6 +41,7 @@ from abi_operator import (
 from abi_operator.optics import ALL_GASES, column_optics
 from abi_operator.planck import in_band_radiance
 from abi_operator.satellites import solar_irradiance
+from abi_operator.settings import NUM_STREAMS
 from abi_operator.solver import cos_scattering_angle, toa_brf, toa_radiance
 
 # Levels; 20 layers. [m]
@@ -262,7 +263,7 @@ def main():
     )
     parser.add_argument("--columns", type=int, default=1000)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--num-streams", type=int, default=8)
+    parser.add_argument("--num-streams", type=int, default=NUM_STREAMS)
     parser.add_argument("--num-doublings", type=int, default=3)
     parser.add_argument("--dtype", choices=["float64", "float32"], default="float64")
     parser.add_argument("--check", action="store_true")

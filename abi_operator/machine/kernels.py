@@ -23,6 +23,10 @@ from .plain import is_plain
 # Rows of matrices up to which a layer is one kernel: see `one_kernel`.
 _LARGEST, _LARGEST_OF_FLOAT32, _LARGEST_IN_PARTS = 8, 4, 12
 
+# Entries of a border, rows times beams, up to which it is: of tiles of 64 columns, and of fewer.
+_LARGEST_BORDER, _LARGEST_OF_FEWER = 128, 156
+_MOST_BEAMS = 32
+
 # Bytes from which on XLA shares an operation among threads; not those that only move or hold data.
 _SHARED_FROM = 2**19
 _MOVING = ("broadcast_in_dim", "dynamic_update_slice", "reshape", "slice", "squeeze")
@@ -32,7 +36,7 @@ _one_kernel.multiple_results = True
 
 
 def one_kernel(
-    function: Callable[..., Any], num_nodes: int, in_parts: bool = False
+    function: Callable[..., Any], num_nodes: int, in_parts: bool = False, num_beams: int = 2
 ) -> Callable[..., Any]:
     """`function`, of matrices with `num_nodes` rows and a tile of columns, as one kernel.
 
@@ -41,11 +45,13 @@ def one_kernel(
     than bytes on 20 kilobytes. With the tiles of `batching` there is none of the second kind up to
     8 rows in float64, nor up to 4 in float32, whose bytes are half as many (12 of both where sums
     come `in_parts`: with 10, the rows of 20 streams, a value then takes 0.65 of the time, and half
-    as long again to compile). A function of larger ones is not marked, but one call all the same:
-    taken apart, in a loop over layers, its parts that need the layer alone would be computed for
-    all layers ahead and read one by one, by a hundred kernels. A function with an operation of the
-    first kind (of very many layers) is left as it is, and so are derivatives of `function` and what
-    `jax.vmap` makes of it, in which nobody has counted.
+    as long again to compile). A matrix with a column for each of many views is shared, too, from
+    65 of them at 4 rows, 24 at 8 and 16 at 12, and the largest of 39 is a ``dot``: with more than
+    about half as many nothing is marked. A function of larger ones is not marked, but one call all
+    the same: taken apart, in a loop over layers, its parts that need the layer alone would be
+    computed for all layers ahead and read one by one, by a hundred kernels. A function with an
+    operation of the first kind (of very many layers) is left as it is, and so are derivatives of
+    `function` and what `jax.vmap` makes of it, in which nobody has counted.
 
     Nor does XLA compile a kernel with an argument that is of no use in it (the process ends with
     "All or none of the slices should have an explicit index"). Arguments that `function` does not
@@ -61,6 +67,8 @@ def one_kernel(
     in_parts
         Whether no operation has more arithmetic than bytes, because long sums come in parts
         (`algebra.product`, `algebra.weighted_sum`).
+    num_beams
+        Columns of the widest matrix that has `num_nodes` rows and is not square.
     """
 
     def call(*args: Any) -> Any:
@@ -74,7 +82,7 @@ def one_kernel(
         jaxpr, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
         body, used = pe.dce_jaxpr(jaxpr.jaxpr, [True] * len(jaxpr.jaxpr.outvars))
         wanted = [x for x, use in zip(leaves, used, strict=True) if use]
-        small = small_enough(num_nodes, jnp.result_type(*leaves), in_parts)
+        small = small_enough(num_nodes, jnp.result_type(*leaves), in_parts, num_beams)
         empty = any(x.size == 0 for x in wanted)
         if empty or (small and _largest_operation(body) >= _SHARED_FROM):
             return function(*args)
@@ -84,8 +92,13 @@ def one_kernel(
     return call
 
 
-def small_enough(num_nodes: int, dtype: Any, in_parts: bool = False) -> bool:
+def small_enough(
+    num_nodes: int, dtype: Any, in_parts: bool = False, num_beams: int = 2
+) -> bool:
     """Whether matrices with so many rows can be in one kernel; see there for the arguments."""
+    entries = _LARGEST_BORDER if num_nodes <= _LARGEST else _LARGEST_OF_FEWER
+    if num_beams > _MOST_BEAMS or num_nodes * num_beams > entries:
+        return False
     if in_parts:
         return num_nodes <= _LARGEST_IN_PARTS
     double = jnp.dtype(dtype) == jnp.float64

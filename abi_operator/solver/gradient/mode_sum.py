@@ -100,9 +100,11 @@ def mode_sum(inputs: ModeSum, given: Given, how: How) -> Float[Array, "view *bat
     forward and reverse mode, and slopes that nobody asks for are not computed.
     """
     plan = _plan(inputs, given, how)
-    num_nodes = inputs.num_nodes
+    num_nodes, num_beams = inputs.num_nodes, 1 + len(inputs.view_secants)
     value = partial(_reflectance, how=how)
-    return (one_kernel(value, num_nodes) if num_nodes <= WHOLE else value)(inputs, plan)
+    if num_nodes <= WHOLE:
+        value = one_kernel(value, num_nodes, num_beams=num_beams)
+    return value(inputs, plan)
 
 
 def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan:
@@ -117,7 +119,7 @@ def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan
 
 
 def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *batch"]:
-    num_nodes = inputs.num_nodes
+    num_nodes, num_beams = inputs.num_nodes, 1 + len(inputs.view_secants)
     rounded = how.rounds(plan, num_nodes)
     lowered = in_single_precision if rounded else lambda x: x
 
@@ -131,7 +133,7 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
             tau = as_deep_as_seen(layer.tau) if rounded and not mean else layer.tau
             return add_layer(stack, *half_layer(a, p, tau, own), tau)
 
-        put_on = one_kernel(put_on, num_nodes, in_parts=True)
+        put_on = one_kernel(put_on, num_nodes, in_parts=True, num_beams=num_beams)
 
         def of_all(ground, layers, plan, odd, kernels, view_secants):
             shared = layers, plan.doublings, odd, kernels, view_secants

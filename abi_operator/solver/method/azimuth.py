@@ -76,7 +76,7 @@ def legendre_tables(
         for rows in of_parity
     )
     # A loop over degrees of which each kernel takes less than its start.
-    beams = one_kernel(at_beams, 1)(cosines)
+    beams = one_kernel(at_beams, 1, num_beams=len(cosines))(cosines)
     return LegendreTables((even, odd), beams)
 
 
@@ -162,7 +162,8 @@ def _scan_upwards(add: Callable, stack: Any, layers: Any, kernels: Any, *shared:
     Reverse mode keeps the stack between layers and computes each layer again: a quarter of the
     time of writing down all that happens in it, and a fraction of the memory.
     """
-    add = one_kernel(add, kernels[0].nodes.shape[0])
+    num_nodes, num_beams = len(kernels[0].nodes), len(kernels[0].beams)
+    add = one_kernel(add, num_nodes, num_beams=num_beams)
 
     def step(stack, layer):
         return add(stack, layer, kernels, *shared), None

@@ -65,7 +65,8 @@ def exact_single_scattering(
 @jax.custom_jvp
 def _scattered_once(*arguments):
     """From the top down, with one exponential function a layer: faster than `_summed`."""
-    return one_kernel(_from_the_top, 1)(*arguments)
+    mu = arguments[4]
+    return one_kernel(_from_the_top, 1, num_beams=len(mu))(*arguments)
 
 
 def _from_the_top(tau, scattering_ratio, phase_function, mu0, mu, sun_secants):
