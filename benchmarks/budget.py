@@ -1,6 +1,6 @@
 """Whether an error budget is kept: columns of scenes and random extremes, in equal shares.
 
-    python benchmarks/budget.py [--columns 100000] [--streams 32] [--budget 1e-3] [--check]
+    python benchmarks/budget.py [--columns 100000] [--streams 32] [--only W2 extremes] [--check]
 
 A fifth of the columns each are images of smoke and ash (W1), of clouds (W2), clear and fire pixels
 of which C07 emits (W3), a retrieval's (W4), all of `pareto_columns` and of seeds that
@@ -34,6 +34,7 @@ NUM_LAYERS = 32
 CALL = 2000  # columns of a call
 SCENES = ("W1", "W2", "W3", "W4")
 EXTREMES = "extremes"
+SHARES = (*SCENES, EXTREMES)
 
 
 def scene_calls(workload, count):
@@ -88,6 +89,7 @@ def main():
     parser.add_argument("--columns", type=int, default=100_000)
     parser.add_argument("--streams", type=int, default=32)
     parser.add_argument("--budget", type=float, default=1e-3)
+    parser.add_argument("--only", nargs="+", choices=SHARES, default=SHARES, help="shares")
     parser.add_argument("--truth", type=int, default=500, help="columns of a share; 0 for none")
     parser.add_argument("--check", action="store_true")
     args = parser.parse_args()
@@ -98,7 +100,7 @@ def main():
     print(f"{args.streams} streams, budget {args.budget:g}\n", flush=True)
     share, options, started = args.columns // 5, {"num_streams": args.streams}, time.perf_counter()
     rows, beside, kept = [], [], True
-    for name in (*SCENES, EXTREMES):
+    for name in args.only:
         truths = None
         if name == EXTREMES:
             error = extreme_errors(share, options, args.budget)

@@ -23,7 +23,7 @@ from abi_operator.solver.skipping import budget
 
 SEEDS = range(5)
 NUM_LAYERS = 36
-CASES = (("W1", 8), ("W1", 20), ("W2", 8), ("W2", 12), ("W3", 4), ("W4", 12))
+CASES = (("W1", 8), ("W1", 20), ("W2", 8), ("W2", 12), ("W2", 24), ("W3", 4), ("W4", 12))
 SETS = (
     "OF_MERGING=0.5",
     "OF_MERGING=0.2",

@@ -92,9 +92,7 @@ def one_kernel(
     return call
 
 
-def small_enough(
-    num_nodes: int, dtype: Any, in_parts: bool = False, num_beams: int = 2
-) -> bool:
+def small_enough(num_nodes: int, dtype: Any, in_parts: bool = False, num_beams: int = 2) -> bool:
     """Whether matrices with so many rows can be in one kernel; see there for the arguments."""
     entries = _LARGEST_BORDER if num_nodes <= _LARGEST else _LARGEST_OF_FEWER
     if num_beams > _MOST_BEAMS or num_nodes * num_beams > entries:

@@ -4,7 +4,7 @@ A budget b is a relative error of the reflectance that may be made on top of wha
 of max(brf, `LEAST_BRF`), in 99 of 100 columns. Of columns that emit it is one of the radiance, or
 of that which `LEAST_BRF` would have, where it is less. Layers are merged until b times
 `OF_MERGING` is estimated to be lost at a group of them (`grouping`). A column's azimuth modes end
-where they count less than b times `OF_MODES`, and those but the mean are left out that are
+where they count less than b times `of_modes`, and those but the mean are left out that are
 expected to be less than b times `OF_NO_MODES` (`mode_sum`). A layer's doublings leave b times
 `OF_DOUBLINGS` of its own response (`doublings`). These shares were fitted by
 `benchmarks/fit_budget.py` on columns of other seeds than those that `benchmarks/skipping.py` judges
@@ -28,7 +28,9 @@ OF_MERGING = 0.35
 """Share of the budget that a group of merged layers may be estimated to lose, and to misplace of
 thermal light that it scatters."""
 OF_MODES = 0.2
-"""Share of the budget below which an azimuth mode is the last one."""
+"""Share of the budget below which an azimuth mode is the last one, up to `FITTED_TO` streams."""
+FITTED_TO = 20
+"""Streams up to which the shares were fitted."""
 OF_DOUBLINGS = 0.2
 """Share of the budget that a layer's response may be off by."""
 OF_DOUBLINGS_WARM = 2e-4
@@ -118,6 +120,16 @@ def expected(
     through = jnp.exp(-(1 / cosines[0] + 1 / cosines[1]) * jnp.sum(tau, axis=0))
     known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside, through)
     return jax.lax.stop_gradient(known)
+
+
+def of_modes(num_streams: int) -> float:
+    """Share of the budget below which an azimuth mode is the last one.
+
+    More streams leave more of a phase function's peak to the modes. Its modes are many of much the
+    same size that change their sign again and again, and add up to more than the one at which
+    they are small: above `FITTED_TO` the share falls with the square of the streams.
+    """
+    return OF_MODES * min(1.0, (FITTED_TO / num_streams) ** 2)
 
 
 def rounds(error_budget: float | None) -> bool:

@@ -100,7 +100,8 @@ class Plan(eqx.Module):
         far."""
         assert self.known is not None and self.error_budget is not None
         light = jnp.maximum(jnp.abs(light + self.known.added), self.known.dark)
-        return jnp.max(size / (budget.OF_MODES * self.error_budget * light), axis=0)
+        share = budget.of_modes(2 * self.layers.moments[0].shape[1])
+        return jnp.max(size / (share * self.error_budget * light), axis=0)
 
     def share_of_slopes(
         self, square: Float[Array, "batch"], tau_slopes: Float[Array, "layer batch"]
