@@ -9,12 +9,13 @@ from .column import Column, Options
 from .method.azimuth import Directions
 from .method.delta_m import ScaledLayers
 from .method.delta_m import delta_m as scale_delta_m
-from .method.single_scatter import direct_transmission
 from .method.surface import AnySurface
 from .skipping import company
-from .skipping.budget import Expected, expected
+from .skipping.budget import Expected, Faint, expected
+from .skipping.depths import Depths, depths
+from .skipping.faint import of_heat, of_sunlight
 from .skipping.grouping import Alike
-from .skipping.heat import Warm, unscattered
+from .skipping.heat import Unscattered, Warm, unscattered
 
 _FEW_STREAMS = 2  # where nobody looks downwards
 _SOME_ALBEDO = 0.1  # of a ground that is none, where a rough one will do
@@ -33,56 +34,105 @@ def need(column: Column, options: Options) -> Float[Array, "*batch"]:
         albedo = jnp.full_like(column.mu0, _SOME_ALBEDO)
     mu = jnp.min(column.mu, axis=0)
     sun = jnp.broadcast_to(1 / column.mu0, tau.shape)
-    ground = albedo * direct_transmission(tau, mu[None], sun)
+    sums = depths(tau, 1 - ssa, ssa * (1 - moments[:, 1]), sun)
+    ground = albedo * jnp.exp(-sums.slant - sums.tau / mu)
     nothing, cosines = jnp.zeros_like(mu)[None], jnp.stack([column.mu0, mu])
-    known = expected(nothing, ground, tau, 1 - ssa, ssa * (1 - moments[:, 1]), cosines)
+    known = expected(nothing, ground, sums, cosines)
     further = ssa * moments[:, degree] if degree > 1 else None
     alike = Alike(tau, ssa, ssa * moments[:, 1], further)
     if column.planck_levels is not None:
-        warm = _warm(column, known, tau, 1 - ssa, albedo)
+        up = _air(column, tau, 1 - ssa, _FEW_STREAMS).up
+        warm = _warm(column, known, albedo, jnp.exp(-sums.tau / mu), up)
         known, alike = warm.known, alike._replace(planck=column.planck_levels, light=warm.light)
     return company.need(alike, known, column.mu0, mu, options.error_budget)
 
 
-def expected_of(
-    column: Column, layers: ScaledLayers, directions: Directions, rest: Float[Array, "view *batch"]
-) -> Expected:
-    """Of the reflectance, to which `rest` is added exactly."""
-    ground = None
-    if not isinstance(column.albedo, AnySurface):  # `rest` has light sent back by others
-        sun = directions.sun_secants
-        ground = column.albedo * direct_transmission(layers.tau, column.mu, sun)
+def depths_of(layers: ScaledLayers, directions: Directions) -> Depths:
+    """What the layers add up to."""
     backward = layers.ssa * (1 - layers.moments[:, 1])
-    return expected(rest, ground, layers.tau, layers.coalbedo, backward, directions.cosines)
+    return depths(layers.tau, layers.coalbedo, backward, directions.sun_secants)
+
+
+def expected_of(
+    column: Column,
+    layers: Depths,
+    directions: Directions,
+    rest: Float[Array, "view *batch"],
+    options: Options,
+) -> Expected:
+    """Of the reflectance, to which `rest` is added exactly.
+
+    A ground that is not Lambertian has sent its light to `rest` and to the modes, and where single
+    scattering is not exact nobody knows what the modes have of it.
+    """
+    cosines, mu = directions.cosines, column.mu
+    if isinstance(column.albedo, AnySurface):
+        return expected(rest, None, layers, cosines)
+    ground = column.albedo * jnp.exp(-layers.slant - layers.tau / mu)
+    known = expected(rest, ground, layers, cosines)
+    if not options.tms:
+        return known
+    light = of_sunlight(layers, column.albedo, mu, directions.sun_secants[0], known.aside)
+    return known._replace(faint=jax.lax.stop_gradient(light))
 
 
 def warm_of(
-    column: Column, layers: ScaledLayers, directions: Directions, rest: Float[Array, "view *batch"]
+    column: Column,
+    layers: ScaledLayers,
+    directions: Directions,
+    rest: Float[Array, "view *batch"],
+    options: Options,
 ) -> Warm:
     """Of the radiance of columns that emit, over Lambertian ground."""
-    assert not isinstance(column.albedo, AnySurface)
-    known = expected_of(column, layers, directions, rest)
-    return _warm(column, known, layers.tau, layers.coalbedo, column.albedo)
+    assert not isinstance(column.albedo, AnySurface) and column.planck_levels is not None
+    sums, secant = depths_of(layers, directions), 1 / column.mu[0]
+    known = expected_of(column, sums, directions, rest, options)
+    ground = column.albedo, jnp.exp(-secant * sums.tau)
+    if known.faint is None or column.isotropic_top is not None:
+        up = _air(column, layers.tau, layers.coalbedo, _FEW_STREAMS).up
+        return _warm(column, known, *ground, up)
+    lost = layers.coalbedo + 0.5 * layers.ssa * (1 - layers.moments[:, 1])
+    # What is scattered backwards is replaced by others' of much the same temperature.
+    air = _air(column, lost * layers.tau, jnp.ones_like(lost), options.num_streams)
+    emitted = column.surface_emission
+    emitted = jnp.zeros_like(secant) if emitted is None else emitted
+    heat = of_heat(sums, column.albedo, secant, column.planck_levels, air, emitted)
+    sun = _sunlight(column)
+    faint = Faint(
+        heat.light + 0.5 * sun * known.faint.light[0], heat.missing + sun * known.faint.missing
+    )
+    warm = _warm(column, known, *ground, air.up)
+    return warm._replace(known=warm.known._replace(faint=jax.lax.stop_gradient(faint)))
+
+
+def _air(column: Column, tau: Array, coalbedo: Array, num_streams: int) -> Unscattered:
+    """Thermal light of the air towards the view and the ground."""
+    levels = column.planck_levels
+    assert levels is not None
+    layers = jax.lax.stop_gradient((tau, coalbedo, levels[:-1], levels[1:] - levels[:-1]))
+    return unscattered(*layers, 1 / jnp.min(column.mu, axis=0), num_streams)
+
+
+def _sunlight(column: Column) -> Float[Array, "*batch"]:
+    """Radiance of a reflectance of 1."""
+    assert column.solar_irradiance is not None
+    return column.solar_irradiance * column.mu0 / np.pi
 
 
 def _warm(
     column: Column,
     known: Expected,
-    tau: Float[Array, "layer *batch"],
-    coalbedo: Float[Array, "layer *batch"],
     albedo: Float[Array, "*batch"],
+    seen: Float[Array, "*batch"],
+    thermal: Float[Array, "*batch"],
 ) -> Warm:
-    """What is known of columns that emit, from what is of their reflectance."""
-    assert column.planck_levels is not None and column.solar_irradiance is not None
-    sun = column.solar_irradiance * column.mu0 / np.pi
-    levels, secant = column.planck_levels, 1 / jnp.min(column.mu, axis=0)
-    seen = jnp.exp(-secant * jnp.sum(tau, axis=0))
-    jumps = levels[1:] - levels[:-1]
-    thermal = unscattered(tau, coalbedo, levels[:-1], jumps, secant, _FEW_STREAMS).up
-    if column.surface_emission is not None:
-        thermal = thermal + seen * column.surface_emission
+    """What is known of columns that emit, from what is of their reflectance, from the share of the
+    ground's light that is `seen` by the view, and from the air's light towards it."""
+    assert column.planck_levels is not None
+    sun, levels = _sunlight(column), column.planck_levels
     light = sun
     if column.surface_emission is not None:
+        thermal = thermal + seen * column.surface_emission
         light = light + jnp.abs(column.surface_emission - (1 - albedo) * levels[-1])
     if column.isotropic_top is not None:
         light = light + column.isotropic_top

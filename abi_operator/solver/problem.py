@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .column import Column, Options
-from .foreknown import expected_of
+from .foreknown import depths_of, expected_of
 from .gradient.mode_sum import ModeSum, mode_sum
 from .gradient.modes import How
 from .method.adding import Emission, Top
@@ -106,7 +106,8 @@ class Problem:
         how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
         if options.error_budget is None:
             return mode_sum(inputs, self.doublings, how)
-        known = expected_of(self.column, layers, self.directions, rest)
+        sums = depths_of(layers, self.directions)
+        known = expected_of(self.column, sums, self.directions, rest, options)
         return mode_sum(inputs, known, how)
 
     def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:

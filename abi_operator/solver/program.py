@@ -112,7 +112,8 @@ def radiance_of_one_view(column: Column, options: Options) -> Float[Array, "*bat
     # Of grounds other than Lambertian nobody knows how they send thermal light to the view.
     skips = options.error_budget is not None and not isinstance(column.albedo, AnySurface)
     if skips and not cold:
-        given = given._replace(warm=warm_of(column, problem.layers, problem.directions, at_once))
+        warm = warm_of(column, problem.layers, problem.directions, at_once, options)
+        given = given._replace(warm=warm)
     how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
     return at_top + sun * at_once[0] + radiance(lit, given, how)
 

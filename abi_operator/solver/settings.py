@@ -29,8 +29,8 @@ class Settings(NamedTuple):
     error_budget
         Relative error of the reflectance (of 0.01 where it is less, in 99 of 100 columns) that may
         be made on top of what the streams leave: layers that are alike are solved as one, azimuth
-        modes and doublings end where the rest is less, and values have most modes in single
-        precision from 1e-4 on (`skipping`). 1e-3 is a good one. None solves everything, and so do
+        modes and doublings end where the rest is less, values have most modes in single precision
+        from 1e-4 on, and where hardly anything is scattered nothing is solved (`skipping`). 1e-3 is a good one. None solves everything, and so do
         second derivatives, and of columns that emit derivatives, several views, and grounds other
         than Lambertian.
     check_values

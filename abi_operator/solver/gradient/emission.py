@@ -26,6 +26,8 @@ from ..method.ground import isotropic
 from ..method.layer import half_layer
 from ..method.mode_layers import read
 from ..method.rounding import as_deep_as_seen, in_single_precision
+from ..skipping import budget
+from ..skipping.faint import unless_faint
 from ..skipping.heat import Warm, lost
 from ..skipping.merging import summed
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
@@ -88,6 +90,15 @@ def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     Its derivatives come from its gradient. The rule is linear in the tangents, so that one gradient
     serves forward and reverse mode, and slopes that nobody asks for are not computed.
     """
+    if given.warm is None:
+        return _solved(lit, given, how)
+    assert how.error_budget is not None
+    known = given.warm.known
+    allowed = budget.OF_FAINT * how.error_budget * known.least
+    return unless_faint(known.faint, allowed, partial(_solved, lit, given, how))
+
+
+def _solved(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     num_nodes = _num_nodes(lit)
     plan = _plan(lit, given, how)
     added = jnp.zeros_like(lit.heating.above)

@@ -21,6 +21,7 @@ from ..method.mode_layers import read
 from ..method.rounding import as_deep_as_seen, in_single_precision
 from ..skipping import budget
 from ..skipping.budget import Expected
+from ..skipping.faint import unless_faint
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .mode import Shared, mode_slopes
 from .modes import LATER, WHOLE, How, Mode, along, every_mode
@@ -99,12 +100,19 @@ def mode_sum(inputs: ModeSum, given: Given, how: How) -> Float[Array, "view *bat
     Columns do not see each other. The rule is linear in the tangents, so that one gradient serves
     forward and reverse mode, and slopes that nobody asks for are not computed.
     """
-    plan = _plan(inputs, given, how)
     num_nodes, num_beams = inputs.num_nodes, 1 + len(inputs.view_secants)
     value = partial(_reflectance, how=how)
     if num_nodes <= WHOLE:
         value = one_kernel(value, num_nodes, num_beams=num_beams)
-    return value(inputs, plan)
+
+    def solved():
+        return value(inputs, _plan(inputs, given, how))
+
+    if how.error_budget is None:
+        return solved()
+    assert isinstance(given, Expected)
+    allowed = budget.OF_FAINT * how.error_budget * given.least
+    return unless_faint(given.faint, allowed, solved)
 
 
 def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan:

@@ -6,7 +6,8 @@ of that which `LEAST_BRF` would have, where it is less. Layers are merged until 
 `OF_MERGING` is estimated to be lost at a group of them (`grouping`). A column's azimuth modes end
 where they count less than b times `of_modes`, and those but the mean are left out that are
 expected to be less than b times `OF_NO_MODES` (`mode_sum`). A layer's doublings leave b times
-`OF_DOUBLINGS` of its own response (`doublings`). These shares were fitted by
+`OF_DOUBLINGS` of its own response (`doublings`). A column of which b times `OF_FAINT` is missing
+without any of this is not solved (`faint`). These shares were fitted by
 `benchmarks/fit_budget.py` on columns of other seeds than those that `benchmarks/skipping.py` judges
 them by, so that the worst of five seeds leaves a third of the budget. From `SINGLE_FROM` on modes
 of values but the mean are solved in single precision, which leaves next to nothing.
@@ -22,6 +23,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .depths import Depths
+
 LEAST_BRF = 0.01
 """Smallest reflectance that an error is compared with. [-]"""
 OF_MERGING = 0.35
@@ -31,6 +34,8 @@ OF_MODES = 0.2
 """Share of the budget below which an azimuth mode is the last one, up to `FITTED_TO` streams."""
 FITTED_TO = 20
 """Streams up to which the shares were fitted."""
+OF_FAINT = 0.7
+"""Share of the budget that the light of a column may miss that is not solved (`faint`)."""
 OF_DOUBLINGS = 0.2
 """Share of the budget that a layer's response may be off by."""
 OF_DOUBLINGS_WARM = 2e-4
@@ -48,6 +53,21 @@ OF_SLOPES = 2e-3
 """The budget of programs for slopes, at most: a column's slopes keep about 1 % whatever else."""
 THICKEST = 2.0
 """Optical depth on the way down and up of a group of layers of which slopes are wanted. [-]"""
+
+
+class Faint(NamedTuple):
+    """Light of columns as if they scattered hardly anything (`faint`).
+
+    Parameters
+    ----------
+    light
+        What the sum over all modes would be.
+    missing
+        How much of it may be wrong, for the view of which most is.
+    """
+
+    light: Float[Array, "*view batch"]
+    missing: Float[Array, "batch"]
 
 
 class Expected(NamedTuple):
@@ -68,6 +88,8 @@ class Expected(NamedTuple):
     through
         Share of the beam that meets nothing on its way to the ground and back: at least the slope
         in the albedo of a Lambertian ground. [-]
+    faint
+        What the modes add up to if hardly anything is scattered; None where nobody knows.
     """
 
     added: Float[Array, "view *batch"]
@@ -75,14 +97,13 @@ class Expected(NamedTuple):
     dark: Float[Array, "*batch"]
     aside: Float[Array, "*batch"]
     through: Float[Array, "*batch"]
+    faint: Faint | None = None
 
 
 def expected(
     added: Float[Array, "view *batch"],
     ground: Float[Array, "view *batch"] | None,
-    tau: Float[Array, "layer *batch"],
-    coalbedo: Float[Array, "layer *batch"],
-    backward: Float[Array, "layer *batch"],
+    layers: Depths,
     cosines: Float[Array, "beam *batch"],
 ) -> Expected:
     r"""Estimate the reflectance of a column from what is scattered once and diffused.
@@ -104,20 +125,19 @@ def expected(
     added, ground
         Light scattered once, and sent back by the ground alone; None of a ground that sends
         light to the modes, which is part of `added`. [-]
-    tau, coalbedo, backward
-        Layers' optical depth, 1 - ssa, and ssa (1 - g). [-]
+    layers
+        What they add up to.
     cosines
         Of the sun's zenith angle and of the views'. [-]
     """
-    t = 0.75 * jnp.sum(backward * tau, axis=0)
-    absorbed = jnp.sum(coalbedo * tau, axis=0)
-    scattered = jnp.sum(tau, axis=0) - absorbed
-    diffused = 0.5 * t / ((1 + t) * (1 + absorbed))
+    t = 0.75 * layers.backward
+    scattered = layers.tau - layers.absorbed
+    diffused = 0.5 * t / ((1 + t) * (1 + layers.absorbed))
     seen = added if ground is None else added + ground
     least = jnp.maximum(LEAST_BRF, jnp.min(seen, axis=0) + diffused)
     twice = (scattered / (1 + scattered)) ** 2 / (cosines[0] * jnp.min(cosines[1:], axis=0))
     aside = jnp.full_like(twice, jnp.inf) if ground is None else twice
-    through = jnp.exp(-(1 / cosines[0] + 1 / cosines[1]) * jnp.sum(tau, axis=0))
+    through = jnp.exp(-(1 / cosines[0] + 1 / cosines[1]) * layers.tau)
     known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside, through)
     return jax.lax.stop_gradient(known)
 

@@ -1,0 +1,63 @@
+"""What the layers of columns add up to: all that is known of their light before they are solved
+hangs on it (`budget`, `faint`)."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...machine.kernels import one_kernel
+from ..method.mode_layers import read
+
+
+class Depths(NamedTuple):
+    """Sums over all layers; without derivatives.
+
+    Parameters
+    ----------
+    tau, absorbed
+        Optical depth, and what of it absorbs. [-]
+    backward
+        Of what scatters, times 1 - g. [-]
+    slant
+        Optical depth along the sun's beam. [-]
+    slant_back
+        Along it, what absorbs and what scatters backwards: half of `backward`. [-]
+    """
+
+    tau: Float[Array, "*batch"]
+    absorbed: Float[Array, "*batch"]
+    backward: Float[Array, "*batch"]
+    slant: Float[Array, "*batch"]
+    slant_back: Float[Array, "*batch"]
+
+
+def depths(
+    tau: Float[Array, "layer *batch"],
+    coalbedo: Float[Array, "layer *batch"],
+    backward: Float[Array, "layer *batch"],
+    sun_secants: Float[Array, "layer *batch"],
+) -> Depths:
+    """In one pass over the layers.
+
+    Parameters
+    ----------
+    tau, coalbedo, backward
+        Layers' optical depth, 1 - ssa, and ssa (1 - g). [-]
+    sun_secants
+        Of each layer's beam. [-]
+    """
+    layers = jax.lax.stop_gradient((tau, coalbedo, backward, sun_secants))
+    return Depths(*one_kernel(_summed, 1)(*layers))
+
+
+def _summed(*layers):
+    def one(k, sums):
+        tau, coalbedo, backward, secant = (read(x, k) for x in layers)
+        absorbed, back = coalbedo * tau, backward * tau
+        slant_back = secant * (absorbed + 0.5 * back)
+        terms = tau, absorbed, back, secant * tau, slant_back
+        return tuple(x + term for x, term in zip(sums, terms, strict=True))
+
+    return jax.lax.fori_loop(0, len(layers[0]), one, (jnp.zeros_like(layers[0][0]),) * 5)
