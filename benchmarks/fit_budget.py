@@ -32,6 +32,8 @@ SETS = (
     "OF_MODES_OF_SLOPES=1e-3",
     "OF_MODES_OF_SLOPES=1e-4",
     "DECAY=0.15",
+    "OF_FAINT=1.4",
+    "OF_FAINT=0.35",
 )
 
 

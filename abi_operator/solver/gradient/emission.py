@@ -26,7 +26,6 @@ from ..method.ground import isotropic
 from ..method.layer import half_layer
 from ..method.mode_layers import read
 from ..method.rounding import as_deep_as_seen, in_single_precision
-from ..skipping import budget
 from ..skipping.faint import unless_faint
 from ..skipping.heat import Warm, lost
 from ..skipping.merging import summed
@@ -93,9 +92,7 @@ def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     if given.warm is None:
         return _solved(lit, given, how)
     assert how.error_budget is not None
-    known = given.warm.known
-    allowed = budget.OF_FAINT * how.error_budget * known.least
-    return unless_faint(known.faint, allowed, partial(_solved, lit, given, how))
+    return unless_faint(given.warm.known, how.error_budget, partial(_solved, lit, given, how))
 
 
 def _solved(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:

@@ -111,8 +111,7 @@ def mode_sum(inputs: ModeSum, given: Given, how: How) -> Float[Array, "view *bat
     if how.error_budget is None:
         return solved()
     assert isinstance(given, Expected)
-    allowed = budget.OF_FAINT * how.error_budget * given.least
-    return unless_faint(given.faint, allowed, solved)
+    return unless_faint(given, how.error_budget, solved)
 
 
 def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan:

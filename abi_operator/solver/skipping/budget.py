@@ -6,7 +6,7 @@ of that which `LEAST_BRF` would have, where it is less. Layers are merged until 
 `OF_MERGING` is estimated to be lost at a group of them (`grouping`). A column's azimuth modes end
 where they count less than b times `of_modes`, and those but the mean are left out that are
 expected to be less than b times `OF_NO_MODES` (`mode_sum`). A layer's doublings leave b times
-`OF_DOUBLINGS` of its own response (`doublings`). A column of which b times `OF_FAINT` is missing
+`OF_DOUBLINGS` of its own response (`doublings`). A column that misses at most b times `OF_FAINT`
 without any of this is not solved (`faint`). These shares were fitted by
 `benchmarks/fit_budget.py` on columns of other seeds than those that `benchmarks/skipping.py` judges
 them by, so that the worst of five seeds leaves a third of the budget. From `SINGLE_FROM` on modes

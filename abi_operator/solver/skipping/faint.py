@@ -24,7 +24,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .budget import Faint
+from . import budget
+from .budget import Expected, Faint
 from .depths import Depths
 from .heat import Unscattered
 
@@ -95,17 +96,16 @@ def of_heat(
 
 
 def unless_faint(
-    faint: Faint | None,
-    allowed: Float[Array, "batch"],
-    solved: Callable[[], Float[Array, "*view batch"]],
+    known: Expected, error_budget: float, solved: Callable[[], Float[Array, "*view batch"]]
 ) -> Float[Array, "*view batch"]:
-    """What is `solved`, but where no more than `allowed` is missing of faint light.
+    """What is `solved`, but where no more than the budget allows is missing of faint light.
 
     Nothing is solved where all columns are so.
     """
+    faint = known.faint
     if faint is None:
         return solved()
-    enough = faint.missing <= allowed
+    enough = faint.missing <= budget.OF_FAINT * error_budget * known.least
     return jax.lax.cond(
         jnp.all(enough), lambda: faint.light, lambda: jnp.where(enough, faint.light, solved())
     )
