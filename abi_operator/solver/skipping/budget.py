@@ -152,6 +152,12 @@ def of_modes(num_streams: int) -> float:
     return OF_MODES * min(1.0, (FITTED_TO / num_streams) ** 2)
 
 
+def decays(num_streams: int) -> tuple[float, ...]:
+    """What the modes before, the latest first, may have decayed by: a small mode beside them is so
+    by chance. Above `FITTED_TO` streams two in a row may be."""
+    return (DECAY, DECAY**2) if num_streams > FITTED_TO else (DECAY,)
+
+
 def rounds(error_budget: float | None) -> bool:
     """Whether an error budget has room for single precision."""
     return error_budget is not None and error_budget >= SINGLE_FROM

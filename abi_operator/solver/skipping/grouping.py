@@ -10,7 +10,8 @@ that is
 the first moment of what differs and one of half the streams' degree k, since layers with different
 phase functions may have one g (delta-M brings those of droplets of other sizes together), with
 rational functions in place of exponentials. In thick layers light is scattered many times, and
-absorbed as often as that: d is the smaller (1 - omega g) tau of the two. From the top,
+absorbed as often as that: d is the larger (1 - omega g) tau of the two, as a thin black layer
+counts for little under a thick white one, and for much if it is spread through it. From the top,
 each layer joins the group above it while the sum of this over the group's members, seen through
 what lies above (1 / (1 + `ATTENUATION` times its backward depth)), stays below what the error
 budget allows; else it starts a new group.
@@ -144,7 +145,7 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
         depth, total = group.tau, group.tau + t
         # Differences of omega and so on, times T: one quotient in all, as they take long.
         sent_back = jnp.maximum(depth - group.forward, 0), jnp.maximum(t - f * t, 0)
-        often = 1 + _DIFFUSED * jnp.minimum(*sent_back)
+        often = 1 + _DIFFUSED * jnp.maximum(*sent_back)
         absorbing = often * jnp.abs(group.scattered - w * depth)
         difference = absorbing + jnp.abs(group.forward - f * depth)
         if group.further is not None:

@@ -231,7 +231,8 @@ def over_modes(
         carry, found = jax.lax.scan(lambda c, mode: body(c, mode, 1.0)[:2], carry, rest)
         return carry, found
     tau = plan.layers.tau[0]
-    before = jnp.full_like(tau, jnp.inf)
+    decays = budget.decays(2 * plan.layers.moments[0].shape[1])
+    before = (jnp.full_like(tau, jnp.inf),) * len(decays)
     beyond = plan.beyond_the_mean()
     counts = jnp.where(beyond | (start == 0), jnp.ones_like(tau), 0)
 
@@ -246,8 +247,11 @@ def over_modes(
         rows = jax.tree.map(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
-        wanting = jnp.maximum(share, budget.DECAY * before) > 1
-        return m + 1, carry, rows, share, jnp.where(wanting & beyond, counts, 0)
+        wanting = share > 1
+        for decay, old in zip(decays, before, strict=True):
+            wanting = wanting | (decay * old > 1)
+        before = share, *before[:-1]
+        return m + 1, carry, rows, before, jnp.where(wanting & beyond, counts, 0)
 
     rows = jax.tree.map(jnp.zeros_like, rows)
     _, carry, rows, _, _ = jax.lax.while_loop(
