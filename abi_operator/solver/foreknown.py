@@ -12,7 +12,7 @@ from .method.delta_m import delta_m as scale_delta_m
 from .method.surface import AnySurface
 from .skipping import company
 from .skipping.budget import Expected, Faint, expected
-from .skipping.depths import Depths, depths
+from .skipping.depths import Depths, depths, scattered
 from .skipping.faint import of_heat, of_sunlight
 from .skipping.grouping import Alike
 from .skipping.heat import Unscattered, Warm, unscattered
@@ -47,7 +47,7 @@ def need(column: Column, options: Options) -> Float[Array, "*batch"]:
     return company.need(alike, known, column.mu0, mu, options.error_budget)
 
 
-def depths_of(layers: ScaledLayers, directions: Directions) -> Depths:
+def _depths_of(layers: ScaledLayers, directions: Directions) -> Depths:
     """What the layers add up to."""
     backward = layers.ssa * (1 - layers.moments[:, 1])
     return depths(layers.tau, layers.coalbedo, backward, directions.sun_secants)
@@ -55,7 +55,7 @@ def depths_of(layers: ScaledLayers, directions: Directions) -> Depths:
 
 def expected_of(
     column: Column,
-    layers: Depths,
+    layers: ScaledLayers,
     directions: Directions,
     rest: Float[Array, "view *batch"],
     options: Options,
@@ -65,14 +65,27 @@ def expected_of(
     A ground that is not Lambertian has sent its light to `rest` and to the modes, and where single
     scattering is not exact nobody knows what the modes have of it.
     """
+    return _expected_of(column, layers, _depths_of(layers, directions), directions, rest, options)
+
+
+def _expected_of(
+    column: Column,
+    layers: ScaledLayers,
+    sums: Depths,
+    directions: Directions,
+    rest: Float[Array, "view *batch"],
+    options: Options,
+) -> Expected:
     cosines, mu = directions.cosines, column.mu
     if isinstance(column.albedo, AnySurface):
-        return expected(rest, None, layers, cosines)
-    ground = column.albedo * jnp.exp(-layers.slant - layers.tau / mu)
-    known = expected(rest, ground, layers, cosines)
+        return expected(rest, None, sums, cosines)
+    ground = column.albedo * jnp.exp(-sums.slant - sums.tau / mu)
+    known = expected(rest, ground, sums, cosines)
     if not options.tms:
         return known
-    light = of_sunlight(layers, column.albedo, mu, directions.sun_secants[0], known.aside)
+    tau, ssa, coalbedo, moments, _ = layers
+    how = scattered(tau, ssa, coalbedo, moments, directions.sun_secants)
+    light = of_sunlight(sums, how, column.albedo, cosines[0], mu)
     return known._replace(faint=jax.lax.stop_gradient(light))
 
 
@@ -85,8 +98,8 @@ def warm_of(
 ) -> Warm:
     """Of the radiance of columns that emit, over Lambertian ground."""
     assert not isinstance(column.albedo, AnySurface) and column.planck_levels is not None
-    sums, secant = depths_of(layers, directions), 1 / column.mu[0]
-    known = expected_of(column, sums, directions, rest, options)
+    sums, secant = _depths_of(layers, directions), 1 / column.mu[0]
+    known = _expected_of(column, layers, sums, directions, rest, options)
     ground = column.albedo, jnp.exp(-secant * sums.tau)
     if known.faint is None or column.isotropic_top is not None:
         up = _air(column, layers.tau, layers.coalbedo, _FEW_STREAMS).up

@@ -39,10 +39,10 @@ def upside_down(
 
 
 def weights_of_modes(
-    num_modes: int, azimuth: Float[Array, "1 *batch"]
-) -> Float[Array, "mode *batch"]:
-    r""":math:`(2 - \delta_{m0})(-1)^m \cos(m\,\Delta\phi)` towards the only view."""
-    order = jnp.arange(num_modes).reshape(-1, *(1,) * (azimuth.ndim - 1))
+    num_modes: int, azimuth: Float[Array, "*view_and_batch"]
+) -> Float[Array, "mode *view_and_batch"]:
+    r""":math:`(2 - \delta_{m0})(-1)^m \cos(m\,\Delta\phi)`."""
+    order = jnp.arange(num_modes).reshape(-1, *(1,) * azimuth.ndim)
     sign = jnp.where(order == 0, 1, jnp.where(order % 2 == 0, 2, -2)).astype(azimuth.dtype)
     return sign * jnp.cos(order.astype(azimuth.dtype) * azimuth)
 

@@ -1,15 +1,14 @@
 """What all modes of a tile of columns share, and what is added to them exactly."""
 
+from functools import cached_property, partial
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .all_modes import Sunlit, twice_reflected
 from .column import Column, Options
-from .foreknown import depths_of, expected_of
-from .gradient.mode_sum import ModeSum, mode_sum
-from .gradient.modes import How
+from .foreknown import expected_of
 from .method.adding import Emission, Top
 from .method.azimuth import (
     Directions,
@@ -18,13 +17,12 @@ from .method.azimuth import (
     emitting_mean,
     higher_modes,
     legendre_tables,
-    weighted_moments,
 )
 from .method.bordered import Bordered, Vector
 from .method.delta_m import ScaledLayers, unscaled
 from .method.delta_m import delta_m as scale_delta_m
 from .method.doublings import layer_doublings, within_reach
-from .method.ground import isotropic, lambertian, reflecting
+from .method.ground import isotropic
 from .method.legendre import legendre_series
 from .method.rounding import within_single_precision
 from .method.single_scatter import (
@@ -33,7 +31,7 @@ from .method.single_scatter import (
     exact_single_scattering,
 )
 from .method.surface import AnySurface
-from .skipping.plan import LayersOfModes
+from .skipping.faint import unless_faint
 
 
 class Problem:
@@ -66,8 +64,17 @@ class Problem:
         self.doublings = layer_doublings(
             self.layers.tau, secants, num_streams, options.num_doublings
         )
-        self.one: Vector = isotropic(num_streams, self.directions.cosines)
-        self.tables = legendre_tables(num_streams, options.num_modes, self.directions.cosines)
+
+    @cached_property
+    def one(self) -> Vector:
+        """Isotropic light 1."""
+        return isotropic(self.options.num_streams, self.directions.cosines)
+
+    @cached_property
+    def tables(self) -> LegendreTables:
+        """Of all modes."""
+        how = self.options.num_streams, self.options.num_modes
+        return legendre_tables(*how, self.directions.cosines)
 
     def mean(self, ground: Bordered) -> Top:
         return azimuthal_mean(*self.shared(), ground, **self.how())
@@ -81,34 +88,18 @@ class Problem:
         shared = self.shared()
         return emitting_mean(*shared, ground, emission, self.one, planck_jumps, **self.how())
 
-    def reflection(
-        self, mean: Bordered, others: Bordered | None, rest: Float[Array, "view *batch"]
-    ) -> Float[Array, "view *batch"]:
+    def reflection(self, rest: Float[Array, "view *batch"]) -> Float[Array, "view *batch"]:
         """Twice the sum over all modes, whose derivative is written out.
 
         `rest` is the light that is added to it.
         """
-        options, layers, azimuth = self.options, self.layers, self.column.relative_azimuth
-        order = jnp.arange(options.num_modes)
-        order = order.reshape(-1, *(1,) * azimuth.ndim)
-        sign = jnp.where(order == 0, 1, jnp.where(order % 2 == 0, 2, -2)).astype(azimuth.dtype)
-        even, odd = weighted_moments(layers)
-        inputs = ModeSum(
-            layers=LayersOfModes(
-                layers.tau, layers.coalbedo, self.directions.sun_secants, (even, odd)
-            ),
-            view_secants=1 / self.directions.cosines[1:],
-            beams=self.tables.beams,
-            ground=mean,
-            grounds=others,
-            weights=sign * jnp.cos(order.astype(azimuth.dtype) * azimuth),
-        )
-        how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
+        column, options = self.column, self.options
+        sunlit = Sunlit(self.layers, self.directions, column.albedo, column.relative_azimuth)
         if options.error_budget is None:
-            return mode_sum(inputs, self.doublings, how)
-        sums = depths_of(layers, self.directions)
-        known = expected_of(self.column, sums, self.directions, rest, options)
-        return mode_sum(inputs, known, how)
+            return twice_reflected((sunlit, self.doublings), options)
+        known = expected_of(column, self.layers, self.directions, rest, options)
+        solved = partial(twice_reflected, options=options)
+        return unless_faint(solved, (sunlit, known), known, options.error_budget)
 
     def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:
         azimuth = self.column.relative_azimuth
@@ -119,19 +110,6 @@ class Problem:
 
     def how(self) -> dict[str, Any]:
         return {"doublings": self.doublings, "single_scattering": not self.options.tms}
-
-
-def grounds_of(albedo: Array | AnySurface, problem: Problem) -> tuple[Bordered, Bordered | None]:
-    """Ground in mode 0, and in the others (None where they do not see it)."""
-    cosines, num_streams = problem.directions.cosines, problem.options.num_streams
-    if not isinstance(albedo, AnySurface):
-        return lambertian(albedo, cosines, num_streams), None
-
-    # All modes at once: a reflectance is evaluated at its azimuths only once.
-    grounds = jax.vmap(lambda m: reflecting(albedo, m, cosines, num_streams))(
-        jnp.arange(problem.options.num_modes)
-    )
-    return jax.tree.map(lambda x: x[0], grounds), jax.tree.map(lambda x: x[1:], grounds)
 
 
 def seen_at_once(problem: Problem) -> Float[Array, "view *batch"]:

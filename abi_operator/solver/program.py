@@ -1,22 +1,25 @@
 """From a tile of columns to what leaves its top: the solver's parts put together."""
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .all_modes import Shining, grounds_of, radiated
 from .column import Column, Options
 from .foreknown import warm_of
 from .gradient.emission import Given, radiance
 from .gradient.emitting_mode import Heating
 from .gradient.fluxes import spherical_albedo
 from .gradient.modes import How
-from .lit import seen_from, seen_from_the_view, upside_down, weights_of_modes
+from .lit import seen_from, upside_down
 from .method.adding import emitting_ground
 from .method.ground import black
 from .method.surface import AnySurface
-from .problem import Problem, grounds_of, seen_at_once
+from .problem import Problem, seen_at_once
+from .skipping.faint import unless_faint
 
 _NO_SUN = How(single_scattering=False, error_budget=None, most=None)
 
@@ -43,11 +46,11 @@ class GroundResponse(NamedTuple):
 def emerging(column: Column, options: Options) -> Emerging:
     """Solve columns whose batch is last (see `column.aligned`)."""
     problem = Problem(column, options)
-    mean, others = grounds_of(column.albedo, problem)
     shine = (column.planck_levels, column.surface_emission, column.isotropic_top)
     if all(x is None for x in shine):
         at_once = seen_at_once(problem)
-        return Emerging(at_once + 0.5 * problem.reflection(mean, others, at_once), None)
+        return Emerging(at_once + 0.5 * problem.reflection(at_once), None)
+    mean, others = grounds_of(column.albedo, problem.directions, options)
     zero = jnp.zeros_like(column.mu0)
     planck, from_ground, from_above = (zero if x is None else x for x in shine)
     jumps = None if column.planck_levels is None else planck[1:] - planck[:-1]
@@ -82,7 +85,7 @@ def ground_response(column: Column, options: Options) -> GroundResponse:
 def plane_albedo(column: Column, options: Options) -> Float[Array, "*batch"]:
     """Share of the sun's light that leaves the top in all directions."""
     problem = Problem(column, options)
-    mean, _ = grounds_of(column.albedo, problem)
+    mean, _ = grounds_of(column.albedo, problem.directions, options)
     nothing = jnp.zeros_like(problem.layers.tau), 0.0 * problem.one
     heating = Heating(*nothing, jnp.full_like(column.mu0, 2))
     lit = seen_from(0, *problem.shared(), mean, heating)
@@ -92,38 +95,28 @@ def plane_albedo(column: Column, options: Options) -> Float[Array, "*batch"]:
 def radiance_of_one_view(column: Column, options: Options) -> Float[Array, "*batch"]:
     """Sunlight and thermal light together, with a derivative that is written out."""
     problem = Problem(column, options)
-    mean, others = grounds_of(column.albedo, problem)
-    zero = jnp.zeros_like(column.mu0)
-    shine = column.planck_levels, column.surface_emission, column.isotropic_top
-    planck, from_ground, from_above = (zero if x is None else x for x in shine)
-    cold = column.planck_levels is None
-    at_top, at_ground = (zero, zero) if cold else (planck[0], planck[-1])
-    heating = Heating(
-        jumps=jnp.zeros_like(column.tau) if cold else planck[1:] - planck[:-1],
-        ground=emitting_ground(mean, problem.one, from_ground, at_ground).column,
-        above=2 * (from_above - at_top),
-    )
     assert column.solar_irradiance is not None
     sun = column.solar_irradiance * column.mu0 / np.pi
-    weights = 0.5 * sun * weights_of_modes(options.num_modes, column.relative_azimuth)
-    lit = seen_from_the_view(*problem.shared(), mean, others, weights, heating)
+    levels = column.planck_levels
+    at_top = jnp.zeros_like(column.mu0) if levels is None else levels[0]
     at_once = seen_at_once(problem)
-    given = Given(problem.doublings)
+    shining = Shining(column, problem.layers, problem.directions, sun, Given(problem.doublings))
+    solved = partial(radiated, options=options)
     # Of grounds other than Lambertian nobody knows how they send thermal light to the view.
-    skips = options.error_budget is not None and not isinstance(column.albedo, AnySurface)
-    if skips and not cold:
-        warm = warm_of(column, problem.layers, problem.directions, at_once, options)
-        given = given._replace(warm=warm)
-    how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
-    return at_top + sun * at_once[0] + radiance(lit, given, how)
+    unknown = levels is None or isinstance(column.albedo, AnySurface)
+    if options.error_budget is None or unknown:
+        return at_top + sun * at_once[0] + solved(shining)
+    warm = warm_of(column, problem.layers, problem.directions, at_once, options)
+    shining = shining._replace(given=shining.given._replace(warm=warm))
+    light = unless_faint(solved, shining, warm.known, options.error_budget)
+    return at_top + sun * at_once[0] + light
 
 
 def over_black_ground(column: Column, options: Options) -> Float[Array, "view *batch"]:
     """`GroundResponse.brf_black` alone."""
-    problem = Problem(column, options)
-    ground = black(problem.directions.cosines, options.num_streams)
+    problem = Problem(column._replace(albedo=jnp.zeros_like(column.mu0)), options)
     at_once = seen_at_once(problem)
-    return at_once + 0.5 * problem.reflection(ground, None, at_once)
+    return at_once + 0.5 * problem.reflection(at_once)
 
 
 def from_ground(column: Column, options: Options, beam: Any) -> Float[Array, "*batch"]:

@@ -26,7 +26,6 @@ from ..method.ground import isotropic
 from ..method.layer import half_layer
 from ..method.mode_layers import read
 from ..method.rounding import as_deep_as_seen, in_single_precision
-from ..skipping.faint import unless_faint
 from ..skipping.heat import Warm, lost
 from ..skipping.merging import summed
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
@@ -89,13 +88,6 @@ def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     Its derivatives come from its gradient. The rule is linear in the tangents, so that one gradient
     serves forward and reverse mode, and slopes that nobody asks for are not computed.
     """
-    if given.warm is None:
-        return _solved(lit, given, how)
-    assert how.error_budget is not None
-    return unless_faint(given.warm.known, how.error_budget, partial(_solved, lit, given, how))
-
-
-def _solved(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     num_nodes = _num_nodes(lit)
     plan = _plan(lit, given, how)
     added = jnp.zeros_like(lit.heating.above)

@@ -21,7 +21,6 @@ from ..method.mode_layers import read
 from ..method.rounding import as_deep_as_seen, in_single_precision
 from ..skipping import budget
 from ..skipping.budget import Expected
-from ..skipping.faint import unless_faint
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .mode import Shared, mode_slopes
 from .modes import LATER, WHOLE, How, Mode, along, every_mode
@@ -104,14 +103,7 @@ def mode_sum(inputs: ModeSum, given: Given, how: How) -> Float[Array, "view *bat
     value = partial(_reflectance, how=how)
     if num_nodes <= WHOLE:
         value = one_kernel(value, num_nodes, num_beams=num_beams)
-
-    def solved():
-        return value(inputs, _plan(inputs, given, how))
-
-    if how.error_budget is None:
-        return solved()
-    assert isinstance(given, Expected)
-    return unless_faint(given, how.error_budget, solved)
+    return value(inputs, _plan(inputs, given, how))
 
 
 def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan:

@@ -22,15 +22,12 @@ class Depths(NamedTuple):
         Of what scatters, times 1 - g. [-]
     slant
         Optical depth along the sun's beam. [-]
-    slant_back
-        Along it, what absorbs and what scatters backwards: half of `backward`. [-]
     """
 
     tau: Float[Array, "*batch"]
     absorbed: Float[Array, "*batch"]
     backward: Float[Array, "*batch"]
     slant: Float[Array, "*batch"]
-    slant_back: Float[Array, "*batch"]
 
 
 def depths(
@@ -55,9 +52,63 @@ def depths(
 def _summed(*layers):
     def one(k, sums):
         tau, coalbedo, backward, secant = (read(x, k) for x in layers)
-        absorbed, back = coalbedo * tau, backward * tau
-        slant_back = secant * (absorbed + 0.5 * back)
-        terms = tau, absorbed, back, secant * tau, slant_back
+        terms = tau, coalbedo * tau, backward * tau, secant * tau
         return tuple(x + term for x, term in zip(sums, terms, strict=True))
 
-    return jax.lax.fori_loop(0, len(layers[0]), one, (jnp.zeros_like(layers[0][0]),) * 5)
+    return jax.lax.fori_loop(0, len(layers[0]), one, (jnp.zeros_like(layers[0][0]),) * 4)
+
+
+class Scattered(NamedTuple):
+    r"""What of the layers scatters, and how; without derivatives.
+
+    Parameters
+    ----------
+    moments
+        :math:`\sum\omega\tau\chi_l`. [-]
+    slant
+        Scattering depth along the sun's beam. [-]
+    over_absorbers
+        :math:`\sum\omega\tau t` and :math:`\sum\omega\tau t^2/2`, with the depth t that absorbs
+        below the middle of a layer. [-]
+    """
+
+    moments: Float[Array, "degree *batch"]
+    slant: Float[Array, "*batch"]
+    over_absorbers: tuple[Float[Array, "*batch"], Float[Array, "*batch"]]
+
+
+def scattered(
+    tau: Float[Array, "layer *batch"],
+    ssa: Float[Array, "layer *batch"],
+    coalbedo: Float[Array, "layer *batch"],
+    moments: Float[Array, "layer degree *batch"],
+    sun_secants: Float[Array, "layer *batch"],
+) -> Scattered:
+    """In one pass over the layers; `moments` has degree 0.
+
+    Parameters
+    ----------
+    tau, ssa, coalbedo, moments
+        Of the layers. [-]
+    sun_secants
+        Of each layer's beam. [-]
+    """
+    layers = jax.lax.stop_gradient((tau, ssa, coalbedo, moments, sun_secants))
+    return Scattered(*one_kernel(_scattered, moments.shape[1])(*layers))
+
+
+def _scattered(*layers):
+    count = len(layers[0])
+
+    def one(k, sums):
+        found, slant, once, squared, below = sums
+        tau, ssa, coalbedo, moments, secant = (read(x, count - 1 - k) for x in layers)
+        scatters, absorbs = ssa * tau, coalbedo * tau
+        middle = below + 0.5 * absorbs
+        over = scatters * middle
+        found, slant = found + scatters * moments, slant + secant * scatters
+        return found, slant, once + over, squared + 0.5 * over * middle, below + absorbs
+
+    start = jnp.zeros_like(layers[3][0]), *(jnp.zeros_like(layers[0][0]),) * 4
+    found, slant, once, squared, _ = jax.lax.fori_loop(0, count, one, start)
+    return found, slant, (once, squared)

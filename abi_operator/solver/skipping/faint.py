@@ -5,65 +5,128 @@ towards the view is added exactly to every column; what is left of the ground's 
 first order in the scattering,
 
 .. math::
-   a\,e^{-\sum_i (s_{0,i} + s)\,\tau_i (1 - \omega_i + \beta_i)}
-   \left(1 + a \cdot 2\,\textstyle\sum_i \beta_i\tau_i\, e^{-D\sum_i(1-\omega_i)\tau_i}\right),
-   \qquad \beta_i = \tfrac12\omega_i(1 - g_i),
+   a\,e^{-s_0(A + B(\mu_0)) - s(A + B(\mu))}
+   \left(1 + \sum_{s_0, s} s\,\frac{F(\mu)}{S}
+   \sum\omega\tau\left[(s - D)t + \tfrac12(s - D)^2t^2\right] + a b\,e^{-DA}\right),
 
-with the albedo a, the secants s of the sun and the view, and the share beta of what is
-scattered that goes back; the other half of it goes on as if nothing had been there, to and from the
-ground. D is the mean secant of diffuse light. No layer is doubled or added. How large the terms are
-that this treats in the mean, and how large what it leaves out, is known beforehand: where that is
-within the budget (`budget.OF_FAINT`) a column has this light instead of a sum over modes
-(`gradient.mode_sum`, `gradient.emission`), and a tile of such columns is not solved. Derivatives
+with the albedo a, the secants of the sun and the view, the depths S that scatters and A that
+absorbs, of which t is below the middle of a layer. Of light along :math:`\mu` the part F is
+scattered into the half of all directions that it came along, and the part B = S - F into the other;
+b is that of isotropic light:
+
+.. math::
+   F(\mu) = \tfrac12\sum_l (2l+1)\,h_l\,P_l(\mu)\sum\omega\tau\chi_l, \qquad
+   b = 2S - \sum_l (2l+1)\,h_l^2\sum\omega\tau\chi_l, \qquad h_l = \int_0^1 P_l\,d\mu.
+
+It goes on along a mean secant D, to and from the ground. No layer is doubled or added. How much
+this may miss is known beforehand: of the ground's light the square of what is sent back, and a
+share of what is scattered where light absorbs; and of the air's what is scattered twice,
+
+.. math:: \frac{1}{4\mu_0\mu}\sum_l(2l+1)\left(\sum\omega\tau\chi_l\right)^2,
+
+where most of it goes. Where that is within the budget (`budget.OF_FAINT`) a column has this light
+instead of a sum over modes (`unless_faint`), and a tile of such columns is not solved. Derivatives
 are always those of the sum.
 """
 
 from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
+from numpy.polynomial import Legendre
 
+from ...machine.algebra import total
 from . import budget
 from .budget import Expected, Faint
-from .depths import Depths
+from .depths import Depths, Scattered
 from .heat import Unscattered
 
 _DIFFUSE = 1.66  # mean secant of diffuse light: W. M. Elsasser, 1942, Harvard Meteorol. Stud. 6
+_SCATTERED = 2.4  # the same of light that thin air sends on to all sides alike
+_UNSURE = 0.6  # share of what absorbs along it that is not known better
+_TWICE = 2.0  # what is scattered twice and more, over what thin layers send to one another
 
 
 def of_sunlight(
     layers: Depths,
+    scattered: Scattered,
     albedo: Float[Array, "*batch"],
+    mu0: Float[Array, "*batch"],
     mu: Float[Array, "view *batch"],
-    sun_secant: Float[Array, "*batch"],
-    aside: Float[Array, "*batch"],
 ) -> Faint:
     """Twice the reflectance by the ground, as the sum over modes has it.
 
     Parameters
     ----------
-    layers, albedo
+    layers, scattered, albedo
         Of the air and the ground.
-    mu, sun_secant
-        Cosines of the views' zenith angles, and secant of the sun's beam at the top. [-]
-    aside
-        A generous estimate of what is scattered twice (`budget.expected`). [-]
+    mu0, mu
+        Cosines of the zenith angles of the sun and the views. [-]
     """
-    seen = albedo * jnp.exp(-layers.slant_back - _lost(layers) / mu)
-    shed = layers.backward * (0.5 * (sun_secant + 1 / mu) + albedo)
-    missing = jnp.max(seen * shed, axis=0) + aside
-    return Faint(2 * seen * (1 + albedo * _back_to_ground(layers)), missing)
+    depth = scattered.moments[0]
+    some = jnp.maximum(depth, jnp.finfo(depth.dtype).tiny)
+    absorbed, sun_secant = layers.absorbed, scattered.slant / some  # where it is scattered
+    forward = [_forward(scattered.moments, x) for x in (mu0[None], mu)]
+    secants = sun_secant[None], 1 / mu
+    back = [s * (depth - f) for s, f in zip(secants, forward, strict=True)]
+    on = [s * f for s, f in zip(secants, forward, strict=True)]
+    again = albedo * _back_to_ground(scattered.moments)
+    to_ground = jnp.exp(scattered.slant - layers.slant - back[0])
+    to_view = jnp.exp(-absorbed / mu - back[1])
+    seen = albedo * to_ground * to_view
+    longer = [s - _SCATTERED for s in secants]
+    once, squared = (x / some for x in scattered.over_absorbers)
+    more = total([x * y * (once + y * squared) for x, y in zip(on, longer, strict=True)])
+    light = seen * (1 + more + again * jnp.exp(-_SCATTERED * absorbed))
+    # Light that is scattered out of a beam may meet next to nothing where that is absorbed.
+    cubes = [jnp.abs(absorbed * x) ** 3 / 6 for x in longer]
+    diffuse = jnp.exp(-_DIFFUSE * absorbed)
+    unsure = [diffuse * jnp.minimum(_UNSURE * absorbed + x, 1) for x in cubes]
+    paths = albedo * (to_view * on[0] * unsure[0] + to_ground * on[1] * unsure[1])
+    turned = back[0] + back[1] + again
+    missing = paths + seen * (turned**2 + _UNSURE * absorbed * again)
+    missing = jnp.max(missing + _TWICE * _twice(scattered.moments) / (mu0 * mu), axis=0)
+    return Faint(2 * light, missing)
+
+
+def _forward(
+    moments: Float[Array, "degree *batch"], mu: Float[Array, "view *batch"]
+) -> Float[Array, "view *batch"]:
+    """F of the above."""
+    total, before, here = moments[0] * jnp.ones_like(mu), jnp.ones_like(mu), mu
+    for degree in range(1, len(moments)):
+        if degree % 2:
+            total = total + (2 * degree + 1) * _half(degree) * moments[degree] * here
+        before, here = here, ((2 * degree + 1) * mu * here - degree * before) / (degree + 1)
+    return 0.5 * total
+
+
+def _back_to_ground(moments: Float[Array, "degree *batch"]) -> Float[Array, "*batch"]:
+    """b of the above."""
+    odd = range(1, len(moments), 2)
+    return moments[0] - total([(2 * k + 1) * _half(k) ** 2 * moments[k] for k in odd])
+
+
+def _twice(moments: Float[Array, "degree *batch"]) -> Float[Array, "*batch"]:
+    """What thin layers scatter to one another, times mu0 and mu; less where they are not thin."""
+    weight = 2 * jnp.arange(len(moments), dtype=moments.dtype) + 1
+    weight = weight.reshape(-1, *(1,) * (moments.ndim - 1))
+    return 0.25 * jnp.sum(weight * (moments / (1 + moments[0])) ** 2, axis=0)
+
+
+@cache
+def _half(degree: int) -> float:
+    """Integral of a Legendre polynomial from 0 to 1."""
+    return float(Legendre.basis(degree).integ()(1) - Legendre.basis(degree).integ()(0))
 
 
 def _lost(layers: Depths) -> Float[Array, "*batch"]:
     """What a beam loses straight down, for what is scattered forwards goes on. [-]"""
     return layers.absorbed + 0.5 * layers.backward
-
-
-def _back_to_ground(layers: Depths) -> Float[Array, "*batch"]:
-    """Share of isotropic light on the ground that the air sends back to it. [-]"""
-    return layers.backward * jnp.exp(-_DIFFUSE * layers.absorbed)
 
 
 def of_heat(
@@ -90,22 +153,57 @@ def of_heat(
         What the ground emits. [radiance unit]
     """
     ground = from_ground + albedo * air.down
-    seen = jnp.exp(-secant * _lost(layers)) * ground * (1 + albedo * _back_to_ground(layers))
+    back = albedo * layers.backward * jnp.exp(-_DIFFUSE * layers.absorbed)
+    seen = jnp.exp(-secant * _lost(layers)) * ground * (1 + back)
     missing = layers.backward * (secant + albedo) * (ground + jnp.max(planck, axis=0))
     return Faint(air.up + seen - planck[0], missing)
 
 
 def unless_faint(
-    known: Expected, error_budget: float, solved: Callable[[], Float[Array, "*view batch"]]
-) -> Float[Array, "*view batch"]:
-    """What is `solved`, but where no more than the budget allows is missing of faint light.
+    solved: Callable[[Any], Array], inputs: Any, known: Expected, error_budget: float
+) -> Array:
+    """What is solved of the inputs, but where no more than the budget allows is missing of faint
+    light; derivatives are those of what is solved.
 
-    Nothing is solved where all columns are so.
+    Nothing is solved where all columns are so, nor prepared for that: what only a solution needs
+    belongs into `solved`.
+
+    Parameters
+    ----------
+    solved
+        Gives light ``*view batch``; closes over nothing that is traced.
+    inputs
+        Its argument, a pytree of arrays.
+    known
+        Of the light of these columns.
+    error_budget
+        Relative error of it that may be made.
     """
+    return solved(inputs) if known.faint is None else _unless(solved, error_budget, inputs, known)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _unless(solved, error_budget, inputs, known):
     faint = known.faint
-    if faint is None:
-        return solved()
     enough = faint.missing <= budget.OF_FAINT * error_budget * known.least
     return jax.lax.cond(
-        jnp.all(enough), lambda: faint.light, lambda: jnp.where(enough, faint.light, solved())
+        jnp.all(enough),
+        lambda _: faint.light,
+        lambda inputs: jnp.where(enough, faint.light, solved(inputs)),
+        inputs,
     )
+
+
+@partial(_unless.defjvp, symbolic_zeros=True)
+def _unless_jvp(solved, _error_budget, primals, tangents):
+    inputs, structure = jax.tree.flatten(primals[0])
+    changes = jax.tree.leaves(tangents[0])
+    moving = [k for k, x in enumerate(changes) if not isinstance(x, SymbolicZero)]
+
+    def of_moving(some):
+        every = list(inputs)
+        for k, x in zip(moving, some, strict=True):
+            every[k] = x
+        return solved(jax.tree.unflatten(structure, every))
+
+    return jax.jvp(of_moving, ([inputs[k] for k in moving],), ([changes[k] for k in moving],))

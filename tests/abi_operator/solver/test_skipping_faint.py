@@ -92,11 +92,11 @@ def test_a_column_is_faint_whoever_it_is_solved_with():
 
 
 def test_thermal_light_of_faint_columns():
-    """With fires below: what is missing is within the budget, and most of it is spent on nobody."""
+    """With fires below: what is missing is within half of the budget."""
     given = columns(scattered=3e-4) | heat()
     whole, found = (np.asarray(toa_radiance(**given, **HOW, error_budget=b)) for b in (None, 1e-3))
     assert np.any(found != whole)
-    assert np.max(np.abs(found - whole) / whole) < 2e-4
+    assert np.max(np.abs(found - whole) / whole) < 5e-4
 
 
 def test_slopes_are_those_of_a_solution(monkeypatch):
