@@ -13,7 +13,8 @@ from .method.surface import AnySurface
 from .skipping import company
 from .skipping.budget import Expected, Faint, expected
 from .skipping.depths import Depths, depths, scattered
-from .skipping.faint import of_heat, of_sunlight
+from .skipping.faint import of_sunlight
+from .skipping.faint_heat import of_heat, passing
 from .skipping.grouping import Alike
 from .skipping.heat import Unscattered, Warm, unscattered
 
@@ -104,12 +105,13 @@ def warm_of(
     if known.faint is None or column.isotropic_top is not None:
         up = _air(column, layers.tau, layers.coalbedo, _FEW_STREAMS).up
         return _warm(column, known, *ground, up)
-    lost = layers.coalbedo + 0.5 * layers.ssa * (1 - layers.moments[:, 1])
-    # What is scattered backwards is replaced by others' of much the same temperature.
-    air = _air(column, lost * layers.tau, jnp.ones_like(lost), options.num_streams)
+    backward = layers.ssa * (1 - layers.moments[:, 1])
+    lost = layers.tau * (layers.coalbedo + 0.5 * backward)
     emitted = column.surface_emission
     emitted = jnp.zeros_like(secant) if emitted is None else emitted
-    heat = of_heat(sums, column.albedo, secant, column.planck_levels, air, emitted)
+    planck = column.planck_levels
+    air = passing(lost, layers.tau * backward, planck, emitted, secant, options.num_streams)
+    heat = of_heat(sums, column.albedo, secant, planck, air, emitted)
     sun = _sunlight(column)
     faint = Faint(
         heat.light + 0.5 * sun * known.faint.light[0], heat.missing + sun * known.faint.missing

@@ -43,7 +43,6 @@ from ...machine.algebra import total
 from . import budget
 from .budget import Expected, Faint
 from .depths import Depths, Scattered
-from .heat import Unscattered
 
 _DIFFUSE = 1.66  # mean secant of diffuse light: W. M. Elsasser, 1942, Harvard Meteorol. Stud. 6
 _SCATTERED = 2.4  # the same of light that thin air sends on to all sides alike
@@ -122,41 +121,6 @@ def _twice(moments: Float[Array, "degree *batch"]) -> Float[Array, "*batch"]:
 def _half(degree: int) -> float:
     """Integral of a Legendre polynomial from 0 to 1."""
     return float(Legendre.basis(degree).integ()(1) - Legendre.basis(degree).integ()(0))
-
-
-def _lost(layers: Depths) -> Float[Array, "*batch"]:
-    """What a beam loses straight down, for what is scattered forwards goes on. [-]"""
-    return layers.absorbed + 0.5 * layers.backward
-
-
-def of_heat(
-    layers: Depths,
-    albedo: Float[Array, "*batch"],
-    secant: Float[Array, "*batch"],
-    planck: Float[Array, "level *batch"],
-    air: Unscattered,
-    from_ground: Float[Array, "*batch"],
-) -> Faint:
-    """Thermal light towards the only view, without that of the top level, as the sum has it.
-
-    Parameters
-    ----------
-    layers, albedo
-        Of the air and the ground.
-    secant
-        Of the view. [-]
-    planck
-        Planck function at the levels. [radiance unit]
-    air
-        Light of layers that emit as much as beams lose in them.
-    from_ground
-        What the ground emits. [radiance unit]
-    """
-    ground = from_ground + albedo * air.down
-    back = albedo * layers.backward * jnp.exp(-_DIFFUSE * layers.absorbed)
-    seen = jnp.exp(-secant * _lost(layers)) * ground * (1 + back)
-    missing = layers.backward * (secant + albedo) * (ground + jnp.max(planck, axis=0))
-    return Faint(air.up + seen - planck[0], missing)
 
 
 def unless_faint(

@@ -102,10 +102,10 @@ def _unscattered(layers, secant, nodes, number=None):
     def one(k, state):
         up, down, seen = state
         tau, coalbedo, planck, jump = (read(x, k) for x in layers)
-        through, mean, rest = _emissivities(secant * tau)
+        through, mean, rest = emissivities(secant * tau)
         up = up + seen * coalbedo * (planck * mean + jump * rest)
         seen = seen * through
-        through, mean, rest = _emissivities(downwards * tau)
+        through, mean, rest = emissivities(downwards * tau)
         down = through * down + coalbedo * ((planck + jump) * mean - jump * rest)
         return up, down, seen
 
@@ -116,7 +116,7 @@ def _unscattered(layers, secant, nodes, number=None):
     return Unscattered(up, total([w * x for w, x in zip(weights.tolist(), down, strict=True)]))
 
 
-def _emissivities(x):
+def emissivities(x: Array) -> tuple[Array, Array, Array]:
     """Transmission, 1 less that, and how much of the increase leaves through the upper face."""
     through = jnp.exp(-x)
     mean = 1 - through

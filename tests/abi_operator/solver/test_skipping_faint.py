@@ -130,3 +130,23 @@ def test_no_share_of_the_budget_is_no_faint_column(monkeypatch):
     # Another budget, of which no program is kept.
     found = np.asarray(toa_brf(**given, **HOW, error_budget=BUDGET * (1 + 2e-9)))
     np.testing.assert_allclose(found, whole, rtol=2e-5)
+
+
+def test_low_sun_through_air_that_absorbs():
+    """Its beam meets more than what is scattered out of it, which reaches the ground instead."""
+    low = columns(scattered=3e-5)
+    low = low | {"mu0": 10 ** np.linspace(-3, -1, len(low["mu0"]))}
+    whole, found = (np.asarray(toa_brf(**low, **HOW, error_budget=b)) for b in (None, BUDGET))
+    assert np.mean(found != whole) > 0.5
+    assert np.max(np.abs(found - whole) / np.maximum(whole, 0.01)) < BUDGET
+
+
+def test_heat_under_opaque_air():
+    """A fire that nobody sees through the air needs no solution."""
+    given = columns(scattered=3e-5) | heat()
+    absorbing = np.linspace(0.5, 3, LAYERS)
+    given = given | {"tau": given["tau"] + absorbing, "surface_emission": np.full(130, 30.0)}
+    given["ssa"] = columns(scattered=3e-5)["ssa"] * columns(scattered=3e-5)["tau"] / given["tau"]
+    whole, found = (np.asarray(toa_radiance(**given, **HOW, error_budget=b)) for b in (None, 1e-3))
+    assert np.all(found != whole)
+    assert np.max(np.abs(found - whole) / whole) < 1e-4
