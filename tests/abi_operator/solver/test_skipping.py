@@ -242,6 +242,17 @@ def test_layers_that_share_g_and_no_more_stay_apart():
     np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
 
 
+def test_a_thin_black_layer_is_not_spread_through_a_thick_white_one():
+    """Under a layer that only scatters nobody sees it, and in one a little of it is much."""
+    tau, _ = layers()
+    first = jnp.arange(LAYERS)[:, None] == 0
+    tau = jnp.where(first, 1e3, 0.05 / LAYERS + 0 * tau)
+    white = jnp.where(first, 1.0, 0 * tau)
+    limits = Limits(jnp.full(5, 2.0), jnp.full(5, 3e-4), np.inf)
+    groups = grouped(Alike(tau, white, 0 * tau), limits)
+    np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) > 0)
+
+
 def test_one_layer_and_more_columns_than_a_tile():
     """Columns are put in order by their groups, of which there is one."""
     one = {k: x[:, :1] if np.ndim(x) > 1 else x for k, x in columns().items()}

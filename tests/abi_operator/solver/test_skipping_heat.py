@@ -9,6 +9,7 @@ import pytest
 from surfaces import Constant
 
 from abi_operator.solver import toa_radiance
+from abi_operator.solver.skipping.faint_heat import passing
 from abi_operator.solver.skipping.grouping import Alike, Limits, grouped
 from abi_operator.solver.skipping.heat import unscattered
 
@@ -113,6 +114,13 @@ def test_unscattered_light_does_not_depend_on_how_layers_are_cut():
     fine, coarse = light(depth, planck), light(depth[[0, 12]], planck[[0, 12]])
     np.testing.assert_allclose(fine.up, coarse.up, rtol=ROUNDING)
     np.testing.assert_allclose(fine.down, coarse.down, rtol=ROUNDING)
+    # Light of air that emits what it takes, as it is found from below.
+    tau, planck = jnp.diff(depth)[:, None], jnp.asarray(planck)[:, None]
+    whole = unscattered(tau, 1 + 0 * tau, planck[:-1], jnp.diff(planck, axis=0), secant, STREAMS)
+    found = passing(tau, 0 * tau, planck, 0 * secant, secant, STREAMS)
+    np.testing.assert_allclose(found.up, whole.up, rtol=ROUNDING)
+    np.testing.assert_allclose(found.down, whole.down, rtol=ROUNDING)
+    assert not found.turned.any()
     # By hand: 0.8 times the integral of (1 + 2 t) exp(-1.5 t) 1.5 from 0 to 3.
     through = np.exp(-4.5)
     wanted = 0.8 * (1 - 7 * through + 2 / 1.5 * (1 - through))
