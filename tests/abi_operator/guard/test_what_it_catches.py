@@ -21,7 +21,7 @@ from abi_operator.optics import CLASSES, mie_species
 COLUMN = importlib.import_module("abi_operator.optics.column")
 BAND_COLUMNS = importlib.import_module("abi_operator.band_columns")
 PROGRAM = importlib.import_module("abi_operator.solver.program")
-PROBLEM = importlib.import_module("abi_operator.solver.problem")
+ALL_MODES = importlib.import_module("abi_operator.solver.all_modes")
 OCEAN = importlib.import_module("abi_operator.surface.ocean")
 
 SEEN = ("C02",)
@@ -190,9 +190,9 @@ def test_columns_that_catch(evaluations, fault):
 def test_a_scaled_solver(monkeypatch):
     """All light 1.001 times too bright, in the two columns that are solved at once."""
     stored = guard.evaluate(two_columns(), BANDS, **SETTINGS)
-    once, more = PROGRAM.seen_at_once, PROBLEM.mode_sum
+    once, more = PROGRAM.seen_at_once, ALL_MODES.mode_sum
     monkeypatch.setattr(PROGRAM, "seen_at_once", lambda *x: 1.001 * once(*x))
-    monkeypatch.setattr(PROBLEM, "mode_sum", lambda *x: 1.001 * more(*x))
+    monkeypatch.setattr(ALL_MODES, "mode_sum", lambda *x: 1.001 * more(*x))
     # A number of doublings of its own, more than enough, so that no other test gets this program.
     now = guard.evaluate(two_columns(), BANDS, num_doublings=11, **SETTINGS)
     caught = guard.compare(stored, now).moved
