@@ -59,8 +59,7 @@ def twice_reflected(given: tuple[Sunlit, Given], options: Options) -> Float[Arra
         grounds=others,
         weights=weights_of_modes(options.num_modes, azimuth),
     )
-    how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
-    return mode_sum(inputs, known, how)
+    return mode_sum(inputs, known, _how(options))
 
 
 class Shining(NamedTuple):
@@ -102,8 +101,11 @@ def radiated(shining: Shining, options: Options) -> Float[Array, "*batch"]:
     )
     weights = 0.5 * sun * weights_of_modes(options.num_modes, column.relative_azimuth[0])
     lit = seen_from_the_view(layers, tables, directions, mean, others, weights, heating)
-    how = How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
-    return radiance(lit, given, how)
+    return radiance(lit, given, _how(options))
+
+
+def _how(options: Options) -> How:
+    return How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
 
 
 def grounds_of(

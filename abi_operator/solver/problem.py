@@ -13,7 +13,6 @@ from .method.adding import Emission, Top
 from .method.azimuth import (
     Directions,
     LegendreTables,
-    azimuthal_mean,
     emitting_mean,
     higher_modes,
     legendre_tables,
@@ -75,9 +74,6 @@ class Problem:
         """Of all modes."""
         how = self.options.num_streams, self.options.num_modes
         return legendre_tables(*how, self.directions.cosines)
-
-    def mean(self, ground: Bordered) -> Top:
-        return azimuthal_mean(*self.shared(), ground, **self.how())
 
     def emitting_mean(
         self,

@@ -10,6 +10,9 @@ from jaxtyping import Array, Float
 from ...machine.kernels import one_kernel
 from ..method.mode_layers import read
 
+DIFFUSE = 1.66
+"""Mean secant of diffuse light: W. M. Elsasser, 1942, Harvard Meteorol. Stud. 6. [-]"""
+
 
 class Depths(NamedTuple):
     """Sums over all layers; without derivatives.

@@ -42,10 +42,9 @@ from numpy.polynomial import Legendre
 from ...machine.algebra import total
 from . import budget
 from .budget import Expected, Faint
-from .depths import Depths, Scattered
+from .depths import DIFFUSE, Depths, Scattered
 
-_DIFFUSE = 1.66  # mean secant of diffuse light: W. M. Elsasser, 1942, Harvard Meteorol. Stud. 6
-_SCATTERED = 2.4  # the same of light that thin air sends on to all sides alike
+_SCATTERED = 2.4  # mean secant of light that thin air sends on to all sides alike
 _UNSURE = 0.6  # share of what absorbs along it that is not known better
 _TWICE = 2.0  # what is scattered twice and more, over what thin layers send to one another
 
@@ -83,7 +82,7 @@ def of_sunlight(
     light = seen * (1 + more + again * jnp.exp(-_SCATTERED * absorbed))
     # Light that is scattered out of a beam may meet next to nothing where that is absorbed.
     cubes = [jnp.abs(absorbed * x) ** 3 / 6 for x in longer]
-    diffuse = jnp.exp(-_DIFFUSE * absorbed)
+    diffuse = jnp.exp(-DIFFUSE * absorbed)
     unsure = [diffuse * jnp.minimum(_UNSURE * absorbed + x, 1) for x in cubes]
     paths = albedo * (to_view * on[0] * unsure[0] + to_ground * on[1] * unsure[1])
     turned = back[0] + back[1] + again
@@ -96,12 +95,12 @@ def _forward(
     moments: Float[Array, "degree *batch"], mu: Float[Array, "view *batch"]
 ) -> Float[Array, "view *batch"]:
     """F of the above."""
-    total, before, here = moments[0] * jnp.ones_like(mu), jnp.ones_like(mu), mu
+    found, before, here = moments[0] * jnp.ones_like(mu), jnp.ones_like(mu), mu
     for degree in range(1, len(moments)):
         if degree % 2:
-            total = total + (2 * degree + 1) * _half(degree) * moments[degree] * here
+            found = found + (2 * degree + 1) * _half(degree) * moments[degree] * here
         before, here = here, ((2 * degree + 1) * mu * here - degree * before) / (degree + 1)
-    return 0.5 * total
+    return 0.5 * found
 
 
 def _back_to_ground(moments: Float[Array, "degree *batch"]) -> Float[Array, "*batch"]:

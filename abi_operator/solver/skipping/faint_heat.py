@@ -25,10 +25,8 @@ from ...machine.kernels import one_kernel
 from ..method.mode_layers import read
 from ..method.quadrature import double_gauss
 from .budget import Faint
-from .depths import Depths
+from .depths import DIFFUSE, Depths
 from .heat import emissivities
-
-_DIFFUSE = 1.66  # mean secant of diffuse light: W. M. Elsasser, 1942, Harvard Meteorol. Stud. 6
 
 
 class Passing(NamedTuple):
@@ -122,7 +120,7 @@ def of_heat(
         What the ground emits. [radiance unit]
     """
     ground = from_ground + albedo * air.down
-    back = albedo * layers.backward * jnp.exp(-_DIFFUSE * layers.absorbed)
+    back = albedo * layers.backward * jnp.exp(-DIFFUSE * layers.absorbed)
     through = jnp.exp(-secant * (layers.absorbed + 0.5 * layers.backward))
     reflected = albedo * layers.backward * through * (ground + jnp.max(planck, axis=0))
     return Faint(air.up + through * ground * (1 + back) - planck[0], air.turned + reflected)
