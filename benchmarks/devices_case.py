@@ -2,7 +2,8 @@
 
 It is a process of its own, for which JAX is set up by the environment. It reads the columns,
 compiles, leaves what the solver gives of them beside the columns, says what it ran on, waits for a
-line and answers with the seconds of its calls.
+line and answers with the seconds of its calls, from NumPy to NumPy and from JAX's arrays to JAX's,
+which stay where they are.
 """
 
 import json
@@ -46,7 +47,7 @@ def main():
     case, folder = Case(**json.loads(sys.argv[1])), Path(sys.argv[2])
     jax.config.update("jax_enable_x64", case.dtype == "float64")
     if case.tile:
-        sizes._ELSEWHERE = sizes._SOLVER_ELSEWHERE = case.tile
+        sizes._ELSEWHERE, sizes._SOLVER_ELSEWHERE = case.tile, {}
     with np.load(folder / f"{case.workload}.npz") as file:
         columns = {name: file[name].astype(case.dtype) for name in file.files}
     options = ours.options_of(case.workload, ERROR, skipping=case.repeats > 0)
@@ -55,12 +56,15 @@ def main():
         brf = toa_brf(**columns, **options)
         return brf.sum(), brf
 
-    def call():
+    def solve(columns):
         """brf, and slopes by name."""
         if case.kind == "value":
-            return np.asarray(toa_brf(**columns, **options)), {}
+            return toa_brf(**columns, **options), {}
         (_, brf), slopes = jax.value_and_grad(total, has_aux=True)(columns)
-        return np.asarray(brf), jax.tree.map(np.asarray, slopes)
+        return brf, slopes
+
+    def call():
+        return jax.tree.map(np.asarray, solve(columns))
 
     start = time.perf_counter()
     brf, slopes = call()
@@ -71,12 +75,22 @@ def main():
     about = {"seconds": seconds, "device": device.device_kind, "memory": memory}
     print(json.dumps(about), flush=True)
     sys.stdin.readline()
-    found = []
-    for _ in range(case.repeats):
-        start = time.perf_counter()
-        call()
-        found.append(time.perf_counter() - start)
-    print(json.dumps(found), flush=True)
+    if not case.repeats:
+        return
+    found = [seconds_of(call) for _ in range(case.repeats)]
+    there = jax.block_until_ready(jax.device_put(columns))
+
+    def stay():
+        jax.block_until_ready(solve(there))
+
+    stay()  # JAX's arrays are cut by a small program of their own
+    print(json.dumps([found, [seconds_of(stay) for _ in range(case.repeats)]]), flush=True)
+
+
+def seconds_of(call):
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
 
 
 if __name__ == "__main__":

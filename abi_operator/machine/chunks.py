@@ -1,15 +1,20 @@
 """Columns with values, in chunks of a few sizes and on every core.
 
 XLA compiles a program for one number of columns and runs it on one core. Where columns can be read
-(not under `jax.jit`) and live on a CPU, they are cut into chunks of one of a program's `widths`, as
-they lie in memory, and threads take one after the other. So a program is compiled for these sizes
-and for no other number of columns, whatever comes; and nothing has to be set before JAX starts.
-The last chunk of a size begins where it must to end with the last column: some columns are solved
-twice, but none is copied. Fewer columns than the smallest chunk has are filled up with copies.
+(not under `jax.jit`), they are cut into chunks of one of a program's `widths`, as they lie in
+memory. So a program is compiled for these sizes and for no other number of columns, whatever comes;
+and nothing has to be set before JAX starts. The last chunk of a size begins where it must to end
+with the last column: some columns are solved twice, but none is copied. Fewer columns than the
+smallest chunk has are filled up with copies.
 
-Values are waited for. Slopes are not where there is a chunk for each core at most (`begin_chunks`):
-they are JAX's own results then, of programs that may still run. To put these together takes one
-more small program for every number of columns, which values do without.
+On a CPU threads take one chunk after the other. Values are waited for. Slopes are not where there
+is a chunk for each core at most (`begin_chunks`): they are JAX's own results then, of programs that
+may still run. To put these together takes one more small program for every number of columns, which
+values do without.
+
+On another device, where to compile takes longer still, all chunks are begun at once, nothing is
+waited for, and what comes of them is put together there: it holds the arguments and the results of
+all columns, and of one chunk what the solver needs.
 
 How they are compiled is settled in `compiler`.
 """
@@ -25,9 +30,12 @@ import jax
 import numpy as np
 from jaxtyping import Array
 
+from .backend import on_cpu
+from .cutting import as_it_lies, counts_of, cut, first_of_each, part_of
 from .lanes import lanes, parted, threads
-from .listening import compiling, tell_solved
+from .listening import compiling, is_heard, tell_solved
 from .processor import usable_cores
+from .slopes import assembled
 
 _ALIGNMENT = 64  # bytes
 
@@ -36,10 +44,9 @@ _compiled: set[Any] = set()
 
 
 def can_be_cut(arrays: Sequence[Any]) -> bool:
-    """Whether columns lie on one CPU device, and nobody settles what runs where."""
+    """Whether columns lie on one device, and nobody settles what runs where."""
     settled = (
-        jax.default_backend() != "cpu"
-        or jax.config.jax_default_device is not None  # pyright: ignore[reportAttributeAccessIssue]
+        jax.config.jax_default_device is not None  # pyright: ignore[reportAttributeAccessIssue]
         or not jax.sharding.get_abstract_mesh().empty
         or jax.process_count() > 1
     )
@@ -75,9 +82,12 @@ def map_chunks(
     Returns
     -------
     The results of all columns, in one array each, with the batch in its shape: the function's own
-    where there is one chunk of just these columns, else NumPy's, which JAX takes without a copy.
+    where there is one chunk of just these columns, else NumPy's, which JAX takes without a copy; on
+    another device than a CPU JAX's.
     """
     columns = _Columns(function, key, arrays, own, math.prod(batch))
+    if not on_cpu():
+        return _put_together(*_begun_elsewhere(columns, widths), batch)
     chunks = cut(columns.size, widths, usable_cores())
     whole = len(chunks) == 1 and batch == (chunks[0][1],)
     results = _Results(columns.size)
@@ -94,7 +104,7 @@ def map_chunks(
         begun = _on_lanes(columns, chunks, columns.of)
         found = [finish(*pair) for pair in zip(chunks, begun, strict=True)]
     else:
-        new = [c for c in _first_of_each(chunks) if not columns.known(c[1])]
+        new = [c for c in first_of_each(chunks) if not columns.known(c[1])]
         found = [threads().submit(solve, c).result() for c in new]
         found += threads().map(solve, [c for c in chunks if c not in new])
     return found[0] if whole else results.shaped(batch)
@@ -110,8 +120,8 @@ def begin_chunks(
 ) -> tuple[tuple[int, ...], list[Any]] | None:
     """Begin what `map_chunks` does, without waiting; None where cores have several chunks each.
 
-    Columns are copied: JAX reads NumPy's arrays in their place, and what the caller writes there
-    while chunks are solved is none of their business.
+    On a CPU columns are copied: JAX reads NumPy's arrays in their place, and what the caller writes
+    there while chunks are solved is none of their business.
 
     Returns
     -------
@@ -119,13 +129,38 @@ def begin_chunks(
     chunks, which may still be computed.
     """
     columns = _Columns(function, key, arrays, own, math.prod(batch))
+    if not on_cpu():
+        return _begun_elsewhere(columns, widths)
     chunks = cut(columns.size, widths, usable_cores())
     if len(chunks) > len(lanes()):
         return None
     found = _on_lanes(columns, chunks, lambda *chunk: _copied(columns.of(*chunk)))
-    ends = [start for start, _ in chunks[1:]] + [columns.size]
-    counts = tuple(end - start for (start, _), end in zip(chunks, ends, strict=True))
-    return counts, found
+    return counts_of(chunks, columns.size), found
+
+
+def _begun_elsewhere(
+    columns: "_Columns", widths: Sequence[int]
+) -> tuple[tuple[int, ...], list[Any]]:
+    """What `begin_chunks` gives, on another device than a CPU."""
+    chunks = cut(columns.size, widths, 1)
+    counts = counts_of(chunks, columns.size)
+
+    def begin() -> list[Any]:
+        found = [columns.begin(width, columns.of(start, width)) for start, width in chunks]
+        if is_heard():
+            for part, count in zip(found, counts, strict=True):
+                jax.block_until_ready(part)
+                tell_solved(count)
+        return found
+
+    return counts, lanes()[0].submit(begin).result()  # not in this thread: see `_on_lanes`
+
+
+def _put_together(counts: tuple[int, ...], found: list[Any], batch: tuple[int, ...]) -> Any:
+    """Results of all columns, on the device."""
+    parts = [jax.tree.leaves(x) for x in found]
+    rows = [assembled(list(x), counts, batch) for x in zip(*parts, strict=True)]
+    return jax.tree.unflatten(jax.tree.structure(found[0]), rows)
 
 
 def _on_lanes(
@@ -160,8 +195,8 @@ class _Columns:
         size: int,
     ) -> None:
         self._function, self._own, self.size = function, own, size
-        self._host = [np.asarray(x) for x in arrays]
-        shapes = tuple(x.shape[each:] for x, each in zip(self._host, own, strict=True))
+        self._arrays = [as_it_lies(x) for x in arrays]
+        shapes = tuple(x.shape[each:] for x, each in zip(self._arrays, own, strict=True))
         self._x64 = jax.dtypes.canonicalize_dtype(np.float64) == np.float64
         self._device = jax.local_devices()[0]
         self._key = key, shapes, self._x64
@@ -170,16 +205,12 @@ class _Columns:
         """Whether the function has been compiled for so many."""
         return (*self._key, width) in _compiled
 
-    def of(self, start: int, width: int) -> list[np.ndarray]:
+    def of(self, start: int, width: int) -> list[Any]:
         """Arrays of so many columns; those after the last are copies of it."""
-        end = start + width
-        place: Any = slice(start, end)
-        if end > self.size:
-            place = np.minimum(np.arange(start, end), self.size - 1)
-        pairs = zip(self._host, self._own, strict=True)
-        return [x[place] if each else x for x, each in pairs]
+        pairs = zip(self._arrays, self._own, strict=True)
+        return [part_of(x, start, width) if each else x for x, each in pairs]
 
-    def begin(self, width: int, some: list[np.ndarray]) -> Any:
+    def begin(self, width: int, some: list[Any]) -> Any:
         """Call the function with arrays of so many columns."""
         known = self.known(width)
         # Settings of the caller's thread, not of this one.
@@ -189,38 +220,6 @@ class _Columns:
         if not known:
             _compiled.add((*self._key, width))
         return found
-
-
-def cut(size: int, widths: Sequence[int], num_cores: int) -> list[tuple[int, int]]:
-    """Start and width of each chunk.
-
-    Large chunks, as many on every core; smaller ones for what is left, so that cores end together.
-    """
-    *smaller, largest = widths
-    if not smaller:
-        return _evenly(0, size, largest)
-    share = size // (largest * num_cores) * num_cores * largest
-    if size - share > largest * num_cores - smaller[-1]:
-        share = size  # no more columns twice than a small chunk has
-    chunks = _evenly(0, share, largest) if share else []
-    rest = size - share
-    if rest == 0:
-        return chunks
-    fitting = [w for w in smaller if w >= rest]
-    if fitting:
-        return [*chunks, (max(0, size - fitting[0]), fitting[0])]
-    return chunks + _evenly(share, rest, smaller[-1])
-
-
-def _evenly(start: int, count: int, width: int) -> list[tuple[int, int]]:
-    """Chunks of one width for `count` columns from `start` on."""
-    number = -(-count // width)
-    end = start + count
-    return [(max(0, min(start + k * width, end - width)), width) for k in range(number)]
-
-
-def _first_of_each(chunks: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    return list({width: (start, width) for start, width in reversed(chunks)}.values())
 
 
 @contextmanager

@@ -29,6 +29,7 @@ from jaxtyping import Array
 from . import compiler
 from .batching import announced, tile_by_tile
 from .chunks import begin_chunks, can_be_cut, map_chunks
+from .cutting import as_it_lies
 from .kept import Kept
 from .plain import is_plain
 from .program import Program
@@ -225,7 +226,7 @@ def _in_memory(program: Program, what: Any, leaves: Leaves) -> dict[str, Any] | 
     if math.prod(batch) == 0 or not can_be_cut(leaves):
         return None
     flat = [
-        _flat(np.asarray(x), number, batch if each else ())
+        _flat(as_it_lies(x), number, batch if each else ())
         for x, number, each in zip(leaves, program.own_axes, own, strict=True)
     ]
     fixed = program.known(leaves, what)
@@ -253,13 +254,16 @@ def _layout(
     return batch, tuple(math.prod(x) > 1 or one and len(x) == len(batch) for x in outer)
 
 
-def _flat(x: np.ndarray, own_axes: int, batch: tuple[int, ...]) -> np.ndarray:
+def _flat(x: Any, own_axes: int, batch: tuple[int, ...]) -> Any:
     """The same with one axis for the batch, a view where it can be."""
     own = x.shape[x.ndim - own_axes :]
     full = (*batch, *own)
     if len(batch) == 1 and x.shape == full:
         return x
-    return np.broadcast_to(x, full).reshape(-1, *own) if batch else x.reshape(1, *own)
+    if not batch:
+        return x.reshape(1, *own)
+    full_of = jnp.broadcast_to if isinstance(x, jax.Array) else np.broadcast_to
+    return full_of(x, full).reshape(-1, *own)
 
 
 def _wanted(of: tuple[Program, Any], leaves: Leaves) -> Any:

@@ -31,6 +31,11 @@ def listening(listener: Listener | None) -> Iterator[None]:
         _listener = before
 
 
+def is_heard() -> bool:
+    """Whether anybody wants to know."""
+    return _listener is not None
+
+
 def tell_solved(columns: int) -> None:
     """So many columns more have been solved."""
     if _listener is not None:

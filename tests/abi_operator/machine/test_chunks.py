@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.machine.chunks import begin_chunks, cut, map_chunks
+from abi_operator.machine.chunks import begin_chunks, map_chunks
+from abi_operator.machine.cutting import cut
 from abi_operator.machine.listening import listening
 from abi_operator.machine.processor import usable_cores
 from abi_operator.solver import toa_brf
