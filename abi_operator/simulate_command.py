@@ -14,7 +14,7 @@ from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import BANDS, GRASSO2013, check_bands
 from .commands import one_sentence, typed, user_warnings
 from .files import output_folder
-from .machine.speed import usable_cores
+from .machine.backend import device_in_words
 from .microphysics import SCHEMES
 from .optics import ALL_GASES
 from .satellites import SATELLITES
@@ -313,5 +313,4 @@ def print_report(report: Report, out: Path, before: list[str]) -> None:
         typer.echo(f"removed {out / name}, a picture of the result before")
     for line in report.lines:
         typer.echo(line)
-    cores = usable_cores()
-    typer.echo(f"computed on {cores} core{'s' if cores > 1 else ''}")
+    typer.echo(f"computed on {device_in_words()}")

@@ -61,7 +61,7 @@ def seen_from_the_view(
     Parameters
     ----------
     layers, tables, directions
-        As in `method.azimuth.azimuthal_mean`.
+        As in `method.azimuth.emitting_mean`.
     ground, grounds
         Its admittance in mode 0, and in the others that there are weights for; None is black.
     weights

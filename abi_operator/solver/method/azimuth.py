@@ -89,36 +89,6 @@ def weighted_moments(layers: ScaledLayers) -> Float[Array, "parity layer degree 
     return jnp.stack([moments[:, 0::2], moments[:, 1::2]])
 
 
-def azimuthal_mean(
-    layers: ScaledLayers,
-    tables: LegendreTables,
-    directions: Directions,
-    ground: Bordered,
-    *,
-    doublings: Doublings,
-    single_scattering: bool,
-) -> Top:
-    """Mode 0, the only one in which energy is kept.
-
-    Parameters
-    ----------
-    layers, tables, directions
-        Scaled layers, top first, with as many moments as streams; Legendre functions; beams.
-    ground
-        Its admittance in mode 0.
-    doublings, single_scattering
-        See `higher_modes`.
-    """
-
-    def add(stack, layer, kernels, directions):
-        of_mean = _half_layer_of_the_mean(layer, kernels, directions, single_scattering)
-        _, admittance, impedance = of_mean
-        return add_layer(stack, admittance, impedance, layer[0])
-
-    properties = _properties_of_the_mean(layers, directions, doublings)
-    return top(_scan_upwards(add, ground, properties, tables.kernels(0), directions))
-
-
 def emitting_mean(
     layers: ScaledLayers,
     tables: LegendreTables,
@@ -131,12 +101,16 @@ def emitting_mean(
     doublings: Doublings,
     single_scattering: bool,
 ) -> tuple[Top, Emission]:
-    """Mode 0 with light that the ground and the layers emit, or that the ground loses.
+    """Mode 0, the only one in which energy is kept, with light that ground and layers emit or lose.
 
     Parameters
     ----------
-    layers, tables, directions, ground, doublings, single_scattering
-        As in `azimuthal_mean`.
+    layers, tables, directions
+        Scaled layers, top first, with as many moments as streams; Legendre functions; beams.
+    ground
+        Its admittance in mode 0.
+    doublings, single_scattering
+        See `higher_modes`.
     emission, one
         Light of the ground (`adding.emitting_ground`); the vector of isotropic light.
     planck_jumps
@@ -204,7 +178,7 @@ def higher_modes(
     Parameters
     ----------
     layers, tables, directions
-        See `azimuthal_mean`.
+        See `emitting_mean`.
     grounds
         Admittances of the ground, modes 1, 2, ... on the first axis of every leaf; None for a
         Lambertian ground, which these modes do not see.

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from abi_operator.machine import sizes
+from abi_operator.machine import backend, sizes
 
 ASKED = {
     "solver": lambda: sizes.tile_size(8, np.float64),
@@ -46,3 +46,12 @@ def test_chunks_are_whole_tiles_and_rise(num_streams, dtype, backend, monkeypatc
 
 def test_a_state_of_many_columns_is_tiled_by_a_vector_at_least():
     assert sizes.tile_of_states(10**6, 8, np.float64) == sizes.VECTOR
+
+
+def test_what_computes_is_named(monkeypatch):
+    monkeypatch.setattr(backend, "usable_cores", lambda: 2)
+    assert backend.device_in_words() == "2 cores"
+    monkeypatch.setattr(backend, "usable_cores", lambda: 1)
+    assert backend.device_in_words() == "1 core"
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    assert backend.device_in_words() == jax.local_devices()[0].device_kind

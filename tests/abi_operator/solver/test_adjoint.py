@@ -18,9 +18,10 @@ from abi_operator.solver.gradient.mode_sum import (
     reflectance_and_gradient,
 )
 from abi_operator.solver.gradient.room import Keeper
+from abi_operator.solver.method.adding import emitting_ground
 from abi_operator.solver.method.azimuth import (
     Directions,
-    azimuthal_mean,
+    emitting_mean,
     higher_modes,
     legendre_tables,
     weighted_moments,
@@ -28,7 +29,7 @@ from abi_operator.solver.method.azimuth import (
 from abi_operator.solver.method.bordered import Bordered
 from abi_operator.solver.method.delta_m import ScaledLayers
 from abi_operator.solver.method.doublings import Doublings, layer_doublings
-from abi_operator.solver.method.ground import lambertian, reflecting
+from abi_operator.solver.method.ground import isotropic, lambertian, reflecting
 from abi_operator.solver.skipping.plan import LayersOfModes
 
 # Both ways sum some 1e4 products, in different orders; relative to a column's largest slope.
@@ -81,8 +82,10 @@ def plain(x, num_streams, general, *, num_doublings, single_scattering):
     shared = scaled(x), tables, Directions(x["cosines"], x["sun_secants"])
     mean, others = grounds(x, num_streams, general)
     how = {"doublings": doublings(x, num_doublings), "single_scattering": single_scattering}
-    total = azimuthal_mean(*shared, mean, **how).reflection()
-    return (total + higher_modes(*shared, others, x["azimuth"][None], **how))[0]
+    one, zero = isotropic(num_streams, x["cosines"]), jnp.zeros_like(x["ground"])
+    emission = emitting_ground(mean, one, zero, zero)
+    top, _ = emitting_mean(*shared, mean, emission, one, None, **how)
+    return (top.reflection() + higher_modes(*shared, others, x["azimuth"][None], **how))[0]
 
 
 @partial(jax.jit, static_argnums=(1, 2))
