@@ -1,13 +1,18 @@
 """How the operator simulates: what each of its functions is told by name."""
 
-from collections.abc import Sequence
-from typing import NamedTuple, TypedDict
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, TypedDict
 
 from .optics import ALL_GASES
 
 NUM_STREAMS = 10
 """Streams of the solver where nothing is said: so many are within 0.5 % of 64 in 99 of 100 columns
 that scenes hold, with ice and without; 8 are within 0.8 % (`benchmarks/truth.py`)."""
+
+
+def streams_of_attributes(attributes: Mapping[str, Any]) -> int:
+    """Streams with which a result was made, by its attributes; those of one that does not say."""
+    return int(attributes.get("num_streams", NUM_STREAMS))
 
 
 class Settings(NamedTuple):

@@ -34,6 +34,7 @@ from abi_operator.nomenclature import QUALITY_FLAGS, SCENARIO
 from abi_operator.radiance import FIRE_BANDS
 from abi_operator.scene import column_states
 from abi_operator.scene.angles import sun_distance
+from abi_operator.settings import streams_of_attributes
 
 from .chunks import map_chunks
 from .declarations import assumed_of_fire, fire
@@ -45,7 +46,6 @@ from .images import (
     images_of,
     retrieved_fields,
     solved_whole,
-    streams_of,
 )
 from .inverse import DEFAULT_MINIMISER, Minimiser
 from .observation import (
@@ -124,7 +124,7 @@ def retrieve_fires(
     if background not in BACKGROUNDS:
         raise ValueError(f"background must be one of {', '.join(BACKGROUNDS)}; got {background!r}.")
     _check(dataset, bands, vector.size, prior)
-    num_streams = streams_of(dataset) if num_streams is None else num_streams
+    num_streams = streams_of_attributes(dataset.attrs) if num_streams is None else num_streams
     with jax.enable_x64(True):
         forward = forward_model(dataset, vector, bands, num_streams)
         imager = imager_of(dataset)

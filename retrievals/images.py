@@ -13,7 +13,7 @@ from abi_operator.files import InputError
 from abi_operator.instrument import IMAGER
 from abi_operator.nomenclature import PLUME, SCENARIO
 from abi_operator.scene import column_states, gases_of
-from abi_operator.settings import NUM_STREAMS
+from abi_operator.settings import streams_of_attributes
 
 from .forward import ForwardModel, prepared
 from .intervals import posterior_intervals
@@ -116,7 +116,7 @@ def retrieve_image(
         )
     _check(dataset, bands, species, vector.size, prior)
     if num_streams is None:
-        num_streams = streams_of(dataset)
+        num_streams = streams_of_attributes(dataset.attrs)
     with jax.enable_x64(True):
         if noise:
             noisy = add_noise(dataset["reflectance_factor"], seed)
@@ -200,16 +200,11 @@ def forward_model(
     return ForwardModel(
         vector,
         bands,
-        streams_of(dataset) if num_streams is None else num_streams,
+        streams_of_attributes(dataset.attrs) if num_streams is None else num_streams,
         gases=gases_of(dataset),
         satellite=str(dataset.attrs.get("satellite", IMAGER.satellite)),
         error_budget=None if budget is None else float(budget),
     )
-
-
-def streams_of(dataset: xr.Dataset) -> int:
-    """Streams of the solver that made a result."""
-    return int(dataset.attrs.get("num_streams", NUM_STREAMS))
 
 
 def solved_whole(dataset: xr.Dataset) -> bool:

@@ -22,7 +22,7 @@ from ..files.mcd43 import KERNELS
 from ..geometry import Geometry
 from ..nomenclature import GROUND, PLUME
 from ..radiance import THERMAL
-from ..settings import NUM_STREAMS
+from ..settings import streams_of_attributes
 from .background import BY_BAND, QUANTITIES
 from .cloud_optics import cloud_optics_of, ice_optics_of
 from .grounds import land_and_sea
@@ -100,7 +100,7 @@ def column_states(
     )
     return State(
         atmosphere,
-        _grounds(reader, bands, num_streams or int(scenario.attrs.get("num_streams", NUM_STREAMS))),
+        _grounds(reader, bands, num_streams or streams_of_attributes(scenario.attrs)),
         Geometry(**angles, spherical=spherical_somewhere(scenario, angles["solar_zenith"])),
         surface_temperature=reader.optional("surface_temperature"),
         fire=_fire(reader) if "fire_fraction" in scenario else None,

@@ -19,7 +19,7 @@ from ..files import InputError
 from ..files.result import CONVENTIONS
 from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
 from ..scene import classes_of, column_states, gases_of, species_of
-from ..settings import NUM_STREAMS, Settings
+from ..settings import Settings, streams_of_attributes
 from .green_change import NearInfrared, green_fields
 from .place import with_place
 from .plume_band import PlumeBand
@@ -104,7 +104,7 @@ def _study(
             f"no pixel is counted: none has {species} with a picture of {smallest_brightness:g} or "
             "brighter, sunlight and no cloud."
         )
-    num_streams = int(image.attrs.get("num_streams", NUM_STREAMS))
+    num_streams = streams_of_attributes(image.attrs)
     settings = Settings(gases=gases_of(image), num_streams=num_streams)
     plume = PlumeBand(_columns(image, inside), species, BAND, settings)
     try:

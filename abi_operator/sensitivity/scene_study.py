@@ -14,7 +14,7 @@ from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
 from ..plume_edges import moves_plume_edges
 from ..scene import column_states, gases_of, species_of
 from ..scene.angles import sun_distance
-from ..settings import NUM_STREAMS, Settings
+from ..settings import Settings, streams_of_attributes
 from .declarations import declared
 from .derivatives import Function, Sensitivity, sensitivity
 from .inputs import Input, changed
@@ -214,7 +214,7 @@ def settings_of_result(image: xr.Dataset) -> Settings:
     return Settings(
         satellite=str(image.attrs.get("satellite", "GOES-16")),
         gases=gases_of(image),
-        num_streams=int(image.attrs.get("num_streams", NUM_STREAMS)),
+        num_streams=streams_of_attributes(image.attrs),
     )
 
 
