@@ -44,6 +44,7 @@ def _evenly(start: int, count: int, width: int) -> list[Chunk]:
 
 
 def first_of_each(chunks: list[Chunk]) -> list[Chunk]:
+    """The first chunk of each width."""
     return list({width: (start, width) for start, width in reversed(chunks)}.values())
 
 

@@ -194,6 +194,7 @@ def test_variables_that_the_scene_does_not_have_leave_nothing_behind(invoke, tmp
     assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
 
 
+@pytest.mark.slow
 def test_gases_ice_fires_and_the_heat_of_the_ground(invoke, tmp_path, inputs):
     """Of another satellite, with cloud ice in a corner and the emissivity of a surface type."""
     with netCDF4.Dataset(inputs.wrf, "a") as file:

@@ -54,6 +54,7 @@ def expected():
     return [by_hand(make_state(), band) for band in SEEN]
 
 
+@pytest.mark.slow
 def test_equals_the_solver_called_by_hand():
     state = make_state()
     found = brf(stacked([state, state]), SEEN, **OPTIONS)

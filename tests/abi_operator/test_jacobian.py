@@ -129,6 +129,7 @@ def check(state, bands, **options):
     assert not wrong.any(), [(paths[k], found[k], expected[k]) for k in np.flatnonzero(wrong)]
 
 
+@pytest.mark.slow
 def test_every_leaf():
     check(rich_state(), FEW, num_streams=2, num_modes=2, num_doublings=1)
 

@@ -199,6 +199,7 @@ def test_public_names():
     assert set(GRASSO2013) < set(BANDS)
 
 
+@pytest.mark.slow
 def test_an_error_budget_is_for_values_and_derivatives():
     """Within it, and the Jacobian within 1 % of each leaf's largest entry."""
     states = stacked([column(liquid=x) for x in (0.0, 0.01, 0.1)])

@@ -5,6 +5,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from abi_operator import BANDS, Geometry, State, brf, radiance, smoke, standard_atmosphere
 from abi_operator.optics import column_optics
@@ -27,6 +28,7 @@ def columns(degrees, spherical, plumes=None):
     return State(each, ground, Geometry(*angles, spherical=spherical))
 
 
+@pytest.mark.slow
 def test_what_flat_layers_lose_of_clear_air():
     """Figures of the module's docstring."""
     degrees = [50.0, 65.0, 70.0, 75.0, 80.0, 85.0]
@@ -101,6 +103,7 @@ def test_slopes_are_those_of_differences():
         np.testing.assert_allclose(backward[:, k], difference, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_in_single_precision_and_where_the_air_shines():
     """Sunlight in C07, of which 85 degrees leave little, and the same by night."""
     state = columns([85.0, 100.0], True)

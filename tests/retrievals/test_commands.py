@@ -62,6 +62,7 @@ def test_retrieve_and_score(folder, run):
     assert "and without --variables" in answer.stderr
 
 
+@pytest.mark.slow
 def test_a_prior_from_a_file_and_diagnostics(folder, run):
     prior = folder / "prior.toml"
     prior.write_text("[aod_550]\nmean = 0.5\nsigma = 0.4\n")

@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from abi_operator import Atmosphere, Fire, Geometry, LiquidCloud, State, mie_plume
 from retrievals import (
@@ -43,6 +44,7 @@ def known():
     return State(air, {band: every(0.1) for band in BANDS}, geometry, every(300.0), burning)
 
 
+@pytest.mark.slow
 def test_ash_and_fire_are_retrieved_together():
     truth = (
         np.array([0.2, 0.4, 0.8, 1.5, 0.3, 0.6]),

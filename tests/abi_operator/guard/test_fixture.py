@@ -56,6 +56,7 @@ def run(project, *arguments):
     )
 
 
+@pytest.mark.slow
 def test_moved_then_accepted(project):
     """A baseline of something else: the test fails with the table, then accepts, with a reason."""
     file = project / "baselines" / "two.nc"

@@ -37,7 +37,8 @@ def operations_of_ours(function, given):
     return [name for name in OURS if f" {name}[" in text]
 
 
-@pytest.mark.parametrize("num_streams", [4, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("num_streams", [4, 8])
 def test_plain_jax_gives_the_same_value_and_gradient(num_streams):
     given = simple_columns(count=3, num_layers=3, num_moments=num_streams + 2)
     how = {"num_streams": num_streams, "num_doublings": 6}

@@ -179,6 +179,7 @@ def test_two_views_at_once():
     assert np.quantile(wrong, 0.99) < 1e-3
 
 
+@pytest.mark.slow
 def test_second_derivatives_solve_everything():
     """They are those without a budget."""
     given = {name: x[:2] for name, x in columns().items()}
