@@ -26,7 +26,7 @@ share of what is scattered where light absorbs; and of the air's what is scatter
 
 where most of it goes. Where that is within the budget (`budget.OF_FAINT`) a column has this light
 instead of a sum over modes (`unless_faint`), and a tile of such columns is not solved. Derivatives
-are always those of the sum.
+are always those of the sum. `benchmarks/fit_faint.py` has what this misses beside that estimate.
 """
 
 from collections.abc import Callable
