@@ -13,6 +13,7 @@ both cores together. A set is kept whose worst part leaves room, as seeds differ
 import argparse
 import time
 from contextlib import contextmanager
+from typing import Any
 
 import jax
 import numpy as np
@@ -38,16 +39,16 @@ SETS = (
 
 
 @contextmanager
-def shares(given: dict[str, float]):
-    """Programs that are traced meanwhile are given these."""
-    before = {name: getattr(budget, name) for name in given}
-    for name, share in given.items():
-        setattr(budget, name, share)
+def standing_in(module: Any, given: dict[str, float]):
+    """In this block a module has these numbers, and so have programs that are traced meanwhile."""
+    before = {name: getattr(module, name) for name in given}
+    for name, number in given.items():
+        setattr(module, name, number)
     try:
         yield
     finally:
-        for name, share in before.items():
-            setattr(budget, name, share)
+        for name, number in before.items():
+            setattr(module, name, number)
 
 
 def read(text):
@@ -95,7 +96,7 @@ def main():
         for k, text in enumerate(["", *args.shares]):
             # Budgets that differ in their last digits are compiled apart.
             options = whole | {"error_budget": args.budget * (1 + 1e-9 * k)}
-            with shares(read(text)):
+            with standing_in(budget, read(text)):
                 tail, largest, slopes, micros = row(given, exact, options)
             cells = f"{text or 'as they are'} | {tail:.2f} | {largest:.2f} | {slopes:.2f}"
             print(f"| {workload} | {streams} | {cells} | {micros:.1f} |", flush=True)

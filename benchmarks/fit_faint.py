@@ -18,11 +18,11 @@ rows.
 """
 
 import argparse
-from contextlib import contextmanager
 
 import jax
 import numpy as np
 import pareto_ours as ours
+from fit_budget import read, standing_in
 from pareto_columns import columns
 from rounds import table
 from skipping import FIRST_SEED
@@ -41,34 +41,21 @@ THIN = (1, 0.1, 0.01, 0.001)
 NUM_LAYERS = 36
 
 
-@contextmanager
-def constants(given: dict[str, float]):
-    """In this block `faint` has these."""
-    before = {name: getattr(faint, name) for name in given}
-    for name, number in given.items():
-        setattr(faint, name, number)
-    try:
-        yield
-    finally:
-        for name, number in before.items():
-            setattr(faint, name, number)
-
-
-def known(arguments, num_streams):
-    """The column's problem, what is seen at once and what is foreknown of the rest."""
+def taken(arguments, num_streams):
+    """What `expected_of` and `warm_of` take: the column first, then its layers and directions, what
+    is seen of it at once, and options.
+    """
     count = len(arguments["mu0"])
     full = {k: np.broadcast_to(x, (count, *np.shape(x)[1:])) for k, x in arguments.items()}
     column = aligned(promoted(**{k: np.moveaxis(x, 0, -1) for k, x in full.items()}), False)
     options = Options(num_streams, num_streams, True, True, None, error_budget=BUDGET)
     problem = Problem(column, options)
-    at_once = seen_at_once(problem)
-    shared = column, problem.layers, problem.directions, at_once, options
-    return column, at_once, shared
+    return column, problem.layers, problem.directions, seen_at_once(problem), options
 
 
 def of_sunlight(arguments, num_streams):
     """Errors of brf, their estimates, and what both are relative to."""
-    _, at_once, shared = known(arguments, num_streams)
+    shared = *_, at_once, _ = taken(arguments, num_streams)
     found = expected_of(*shared)
     whole = np.asarray(toa_brf(**arguments, num_streams=num_streams))
     light = at_once[0] + 0.5 * found.faint.light[0]
@@ -77,7 +64,7 @@ def of_sunlight(arguments, num_streams):
 
 def of_heat(arguments, num_streams):
     """The same of radiance."""
-    column, at_once, shared = known(arguments, num_streams)
+    shared = column, *_, at_once, _ = taken(arguments, num_streams)
     found = warm_of(*shared).known
     sun = column.solar_irradiance * column.mu0 / np.pi
     light = column.planck_levels[0] + sun * at_once[0] + found.faint.light
@@ -147,11 +134,9 @@ def main():
     args = parser.parse_args()
     assert SEED < FIRST_SEED
     jax.config.update("jax_enable_x64", True)
-    sets = [{}] + [{k: float(x)} for k, x in (text.split("=") for text in args.constants)]
-    for given in sets:
-        text = ", ".join(f"{name} = {number:g}" for name, number in given.items())
+    for text in ["", *args.constants]:
         print(f"{text or 'as they are'}: {args.columns} columns a row, a budget of {BUDGET:g}\n")
-        with constants(given):
+        with standing_in(faint, read(text)):
             rows = [
                 row(name, kind, arguments, streams)
                 for streams in args.streams

@@ -23,3 +23,11 @@ def test_what_the_user_has_chosen_stays(monkeypatch, without_flags):
     (name, *_) = compiler.options()
     monkeypatch.setenv("XLA_FLAGS", f"--{name}=true")
     assert name not in compiler.options()
+
+
+def test_a_gpu_follows_loops_by_itself(monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", "")
+    monkeypatch.setattr(compiler, "on_cpu", lambda: False)
+    assert list(compiler.options()) == ["xla_gpu_enable_command_buffer"]
+    monkeypatch.setenv("XLA_FLAGS", "--xla_gpu_enable_command_buffer=")
+    assert compiler.options() == {}

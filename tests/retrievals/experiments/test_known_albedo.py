@@ -12,7 +12,6 @@ def table():
     return known_albedo(size=10, seed=1, num_streams=2)
 
 
-@pytest.mark.slow
 def test_errors_grow_with_what_is_not_known_of_the_ground(table):
     assert (table["num_pixels"] == 100).all()
     rmse = table["rmse"]
