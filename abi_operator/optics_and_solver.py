@@ -86,7 +86,12 @@ class _Program(NamedTuple):
     def tile(self, leaves: Leaves, what: Any) -> int:
         return tile_size(leaves, self.structure, self.options)
 
-    def need(self, leaves: Leaves) -> None:
+    @property
+    def need(self) -> None:
+        return None
+
+    @property
+    def at_once(self) -> None:
         return None
 
     def value(self, leaves: Leaves) -> Array:
@@ -125,7 +130,12 @@ class _Depths(NamedTuple):
     def tile(self, leaves: Leaves, what: Any) -> int:
         return chunks_to_read()[-1]
 
-    def need(self, leaves: Leaves) -> None:
+    @property
+    def need(self) -> None:
+        return None
+
+    @property
+    def at_once(self) -> None:
         return None
 
     def value(self, leaves: Leaves) -> Array:

@@ -18,6 +18,7 @@ rows.
 """
 
 import argparse
+from functools import partial
 
 import jax
 import numpy as np
@@ -30,8 +31,7 @@ from stress_columns import draw
 
 from abi_operator.solver import toa_brf, toa_radiance
 from abi_operator.solver.column import Options, aligned, promoted
-from abi_operator.solver.foreknown import expected_of, warm_of
-from abi_operator.solver.problem import Problem, seen_at_once
+from abi_operator.solver.glimpse import radiance, reflectance
 from abi_operator.solver.skipping import budget, faint
 
 SEED = 5
@@ -41,35 +41,19 @@ THIN = (1, 0.1, 0.01, 0.001)
 NUM_LAYERS = 36
 
 
-def taken(arguments, num_streams):
-    """What `expected_of` and `warm_of` take: the column first, then its layers and directions, what
-    is seen of it at once, and options.
-    """
+def glimpsed(kind, door, arguments, num_streams):
+    """Errors of light that nobody has solved, their estimates, and what both are relative to."""
     count = len(arguments["mu0"])
     full = {k: np.broadcast_to(x, (count, *np.shape(x)[1:])) for k, x in arguments.items()}
     column = aligned(promoted(**{k: np.moveaxis(x, 0, -1) for k, x in full.items()}), False)
     options = Options(num_streams, num_streams, True, True, None, error_budget=BUDGET)
-    problem = Problem(column, options)
-    return column, problem.layers, problem.directions, seen_at_once(problem), options
+    found = kind(column, options)
+    whole = np.asarray(door(**arguments, num_streams=num_streams))
+    return abs(np.asarray(found.light[0]) - whole), found.missing, found.least
 
 
-def of_sunlight(arguments, num_streams):
-    """Errors of brf, their estimates, and what both are relative to."""
-    shared = *_, at_once, _ = taken(arguments, num_streams)
-    found = expected_of(*shared)
-    whole = np.asarray(toa_brf(**arguments, num_streams=num_streams))
-    light = at_once[0] + 0.5 * found.faint.light[0]
-    return abs(np.asarray(light) - whole), found.faint.missing, found.least
-
-
-def of_heat(arguments, num_streams):
-    """The same of radiance."""
-    shared = column, *_, at_once, _ = taken(arguments, num_streams)
-    found = warm_of(*shared).known
-    sun = column.solar_irradiance * column.mu0 / np.pi
-    light = column.planck_levels[0] + sun * at_once[0] + found.faint.light
-    whole = np.asarray(toa_radiance(**arguments, num_streams=num_streams))
-    return abs(np.asarray(light) - whole), found.faint.missing, found.least
+of_sunlight = partial(glimpsed, reflectance, toa_brf)
+of_heat = partial(glimpsed, radiance, toa_radiance)
 
 
 def row(name, kind, arguments, num_streams):

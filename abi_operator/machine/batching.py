@@ -17,6 +17,7 @@ few dozen exchanges, as long as some hundred columns of 4 streams.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import jax
@@ -25,7 +26,9 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array
 
+from .plain import is_plain
 from .sizes import VECTOR
+from .told import AtOnce, glanced, unless_told, with_the_rest
 
 _FEWEST_A_DEVICE = 4 * VECTOR
 
@@ -35,7 +38,8 @@ def tile_by_tile(
     leaves: Sequence[Array],
     own_axes: Sequence[int],
     tile: int,
-    need: Callable[[list[Array]], Array | None] | None = None,
+    need: Callable[[list[Array]], Array] | None = None,
+    at_once: AtOnce | None = None,
 ) -> Any:
     """Apply a batch-last `function` to arrays whose batch comes first, on every CPU device.
 
@@ -50,7 +54,7 @@ def tile_by_tile(
         Number of axes of each that belong to one column.
     tile
         Columns a tile, at most.
-    need
+    need, at_once
         As in `map_tiles`, of such a list.
 
     Returns
@@ -70,7 +74,7 @@ def tile_by_tile(
             return jnp.moveaxis(x, -1, 0).reshape(*batch, *x.shape[:-1])
 
         last = [batch_last(x, own) for x, own in zip(leaves, own_axes, strict=True)]
-        return jax.tree.map(batch_first, map_tiles(function, last, tile, need))
+        return jax.tree.map(batch_first, map_tiles(function, last, tile, need, at_once))
 
     batch, shapes = _outer(leaves, own_axes)
     divided = [len(shape) == len(batch) > 0 and shape[0] == batch[0] for shape in shapes]
@@ -89,7 +93,8 @@ def map_tiles(
     function: Callable[[Any], Any],
     columns: Any,
     tile: int,
-    need: Callable[[Any], Array | None] | None = None,
+    need: Callable[[Any], Array] | None = None,
+    at_once: AtOnce | None = None,
 ) -> Any:
     """Apply a batch-last `function` to a pytree of arrays tile by tile, on every CPU device.
 
@@ -104,11 +109,16 @@ def map_tiles(
         Columns a tile, at most.
     need
         Maps columns to a number each, by which they are sorted before they are cut into tiles:
-        those in a tile are then alike. None, for itself or from it, leaves them as they come.
+        those in a tile are then alike. None leaves them as they come.
+    at_once
+        Tells the value of some columns without `function` (`told`); None for itself: of none.
     """
     size = jax.tree.leaves(columns)[0].shape[-1]
     devices = _devices(size)
     count, width = _equal_tiles(size, tile, len(devices))
+    apart = count == 1 or len(devices) > 1 or is_plain()
+    if apart:
+        function = unless_told(function, at_once)
     if count == 1:
         return function(columns)
 
@@ -134,8 +144,14 @@ def map_tiles(
 
         return _divided(mapped, devices, _SHARE) if len(devices) > 1 else mapped
 
+    if at_once is not None and not apart:
+        glance = partial(glanced, at_once=at_once, need=need)
+        known = jax.tree.map(joined, by_tiles(glance)(jax.tree.map(tiled, columns)))
+        first, known = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), (columns, known))
+        whole = with_the_rest(function, first, known, width)
+        return jax.tree.map(lambda x: jnp.moveaxis(x, 0, -1), whole)
     order = place = None
-    if need is not None and jax.eval_shape(need, columns) is not None:
+    if need is not None:
         numbers = joined(by_tiles(need)(jax.tree.map(tiled, columns)))
         order = jnp.argsort(numbers)
         place = _places(order)

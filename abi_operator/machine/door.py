@@ -271,7 +271,7 @@ def _wanted(of: tuple[Program, Any], leaves: Leaves) -> Any:
     program, what = of
     own_axes, tile = program.own_axes, program.tile(leaves, what)
     if what == "value":
-        return tile_by_tile(program.value, leaves, own_axes, tile, program.need)
+        return tile_by_tile(program.value, leaves, own_axes, tile, program.need, program.at_once)
     both = partial(program.value_and_slopes, wanted=what)
     value, slopes = tile_by_tile(both, leaves, own_axes, tile, program.need)
     return value, joined(slopes, chosen(own_axes, what))

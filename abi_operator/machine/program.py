@@ -1,11 +1,12 @@
 """What the door asks of a program of columns that do not see each other."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, Self
 
 from jaxtyping import Array, Float
 
 from .slopes import Leaves
+from .told import AtOnce
 
 
 class Program(Protocol):
@@ -40,11 +41,17 @@ class Program(Protocol):
         """Columns that are solved together, at most, for what is wanted."""
         ...
 
-    def need(self, leaves: Leaves) -> Float[Array, " batch"] | None:
+    @property
+    def need(self) -> Callable[[Leaves], Float[Array, " batch"]] | None:
         """How much of each column ``*own batch`` is solved: those that need alike share a tile.
 
         None where all columns need as much.
         """
+        ...
+
+    @property
+    def at_once(self) -> AtOnce | None:
+        """What tells the value of some columns without `value`; None where nothing does."""
         ...
 
     def value(self, leaves: Leaves) -> Any:

@@ -11,6 +11,7 @@ from jaxtyping import Array
 from ..machine.door import Leaves, enter
 from ..machine.sizes import chunks_of_columns, tile_size
 from ..machine.slopes import chosen, slopes_by_reverse_mode
+from ..machine.told import AtOnce
 from .checks import check_arguments, check_in_memory
 from .column import (
     Column,
@@ -22,6 +23,7 @@ from .column import (
     own_axes,
 )
 from .foreknown import need
+from .glimpse import Glimpse, can_be_seen
 from .method.doublings import unknown_doublings
 from .settings import Settings, check_settings
 from .skipping import budget, company
@@ -33,6 +35,7 @@ def solve(
     settings: Settings,
     *,
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None = None,
+    faint: Callable[[Column, Options], Glimpse] | None = None,
     by_view: Any = True,
     given: Column | None = None,
 ) -> Any:
@@ -50,6 +53,8 @@ def solve(
         Maps such columns to what `tile` gives and to a `Column` of slopes, ``row *own batch`` in
         place of each ``*own batch``; see `machine.program.Program`. None is reverse mode through
         `tile`.
+    faint
+        Maps such columns to what `tile` gives of those that need no solution; see `glimpse`.
     by_view
         Which results of `tile` have an axis of views: a pytree of bools of the same structure.
     given
@@ -63,7 +68,7 @@ def solve(
     # Those of None are checked by the program, which knows what can be read under derivatives too.
     checked = settings.check_values is not None
     several = settings.multiple_views
-    program = _Program(tile, gradient, options, several, structure, by_view, checked)
+    program = _Program(tile, gradient, faint, options, several, structure, by_view, checked)
     return enter(program, leaves)
 
 
@@ -87,6 +92,7 @@ class _Program(NamedTuple):
 
     solve: Callable[[Column, Options], Any]
     gradient: Callable[[Column, Options], tuple[Any, Column]] | None
+    faint: Callable[[Column, Options], Glimpse] | None
     options: Options
     multiple_views: bool
     structure: Any
@@ -135,8 +141,24 @@ class _Program(NamedTuple):
         options = self.options
         return what == "value" and options.delta_m and budget.rounds(options.error_budget)
 
-    def need(self, leaves: Leaves) -> Array | None:
-        return need(self._aligned(leaves), self.options) if self._in_order else None
+    @property
+    def need(self) -> Callable[[Leaves], Array] | None:
+        return self._needed if self._in_order else None
+
+    def _needed(self, leaves: Leaves) -> Array:
+        return need(self._aligned(leaves), self.options)
+
+    @property
+    def at_once(self) -> AtOnce | None:
+        if self.faint is None:
+            return None
+        given = jax.tree.unflatten(self.structure, self.own_axes)
+        return self._glimpsed if can_be_seen(given, self.options) else None
+
+    def _glimpsed(self, leaves: Leaves) -> tuple[Any, Array]:
+        assert self.faint is not None and self.options.error_budget is not None
+        found = self.faint(self._aligned(leaves), self.options)
+        return self._outward(found.light), found.enough(self.options.error_budget)
 
     @property
     def _in_order(self) -> bool:

@@ -11,10 +11,8 @@ from .method.delta_m import ScaledLayers
 from .method.delta_m import delta_m as scale_delta_m
 from .method.surface import AnySurface
 from .skipping import company
-from .skipping.budget import Expected, Faint, expected
-from .skipping.depths import Depths, depths, scattered
-from .skipping.faint import of_sunlight
-from .skipping.faint_heat import of_heat, passing
+from .skipping.budget import Expected, expected
+from .skipping.depths import Depths, depths
 from .skipping.grouping import Alike
 from .skipping.heat import Unscattered, Warm, unscattered
 
@@ -59,35 +57,21 @@ def expected_of(
     layers: ScaledLayers,
     directions: Directions,
     rest: Float[Array, "view *batch"],
-    options: Options,
 ) -> Expected:
     """Of the reflectance, to which `rest` is added exactly.
 
-    A ground that is not Lambertian has sent its light to `rest` and to the modes, and where single
-    scattering is not exact nobody knows what the modes have of it.
+    A ground that is not Lambertian has sent its light to `rest` and to the modes.
     """
-    return _expected_of(column, layers, _depths_of(layers, directions), directions, rest, options)
+    return _expected_of(column, _depths_of(layers, directions), directions, rest)
 
 
 def _expected_of(
-    column: Column,
-    layers: ScaledLayers,
-    sums: Depths,
-    directions: Directions,
-    rest: Float[Array, "view *batch"],
-    options: Options,
+    column: Column, sums: Depths, directions: Directions, rest: Float[Array, "view *batch"]
 ) -> Expected:
-    cosines, mu = directions.cosines, column.mu
     if isinstance(column.albedo, AnySurface):
-        return expected(rest, None, sums, cosines)
-    ground = column.albedo * jnp.exp(-sums.slant - sums.tau / mu)
-    known = expected(rest, ground, sums, cosines)
-    if not options.tms:
-        return known
-    tau, ssa, coalbedo, moments, _ = layers
-    how = scattered(tau, ssa, coalbedo, moments, directions.sun_secants)
-    light = of_sunlight(sums, how, column.albedo, cosines[0], mu)
-    return known._replace(faint=jax.lax.stop_gradient(light))
+        return expected(rest, None, sums, directions.cosines)
+    ground = column.albedo * jnp.exp(-sums.slant - sums.tau / column.mu)
+    return expected(rest, ground, sums, directions.cosines)
 
 
 def warm_of(
@@ -95,29 +79,14 @@ def warm_of(
     layers: ScaledLayers,
     directions: Directions,
     rest: Float[Array, "view *batch"],
-    options: Options,
 ) -> Warm:
     """Of the radiance of columns that emit, over Lambertian ground."""
-    assert not isinstance(column.albedo, AnySurface) and column.planck_levels is not None
-    sums, secant = _depths_of(layers, directions), 1 / column.mu[0]
-    known = _expected_of(column, layers, sums, directions, rest, options)
-    ground = column.albedo, jnp.exp(-secant * sums.tau)
-    if known.faint is None or column.isotropic_top is not None:
-        up = _air(column, layers.tau, layers.coalbedo, _FEW_STREAMS).up
-        return _warm(column, known, *ground, up)
-    backward = layers.ssa * (1 - layers.moments[:, 1])
-    lost = layers.tau * (layers.coalbedo + 0.5 * backward)
-    emitted = column.surface_emission
-    emitted = jnp.zeros_like(secant) if emitted is None else emitted
-    planck = column.planck_levels
-    air = passing(lost, layers.tau * backward, planck, emitted, secant, options.num_streams)
-    heat = of_heat(sums, column.albedo, secant, planck, air, emitted)
-    sun = _sunlight(column)
-    faint = Faint(
-        heat.light + 0.5 * sun * known.faint.light[0], heat.missing + sun * known.faint.missing
-    )
-    warm = _warm(column, known, *ground, air.up)
-    return warm._replace(known=warm.known._replace(faint=jax.lax.stop_gradient(faint)))
+    assert not isinstance(column.albedo, AnySurface)
+    sums = _depths_of(layers, directions)
+    known = _expected_of(column, sums, directions, rest)
+    seen = jnp.exp(-sums.tau / column.mu[0])
+    up = _air(column, layers.tau, layers.coalbedo, _FEW_STREAMS).up
+    return _warm(column, known, column.albedo, seen, up)
 
 
 def _air(column: Column, tau: Array, coalbedo: Array, num_streams: int) -> Unscattered:

@@ -1,6 +1,6 @@
 """What all modes of a tile of columns share, and what is added to them exactly."""
 
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import jax.numpy as jnp
@@ -30,7 +30,6 @@ from .method.single_scatter import (
     exact_single_scattering,
 )
 from .method.surface import AnySurface
-from .skipping.faint import unless_faint
 
 
 class Problem:
@@ -93,9 +92,8 @@ class Problem:
         sunlit = Sunlit(self.layers, self.directions, column.albedo, column.relative_azimuth)
         if options.error_budget is None:
             return twice_reflected((sunlit, self.doublings), options)
-        known = expected_of(column, self.layers, self.directions, rest, options)
-        solved = partial(twice_reflected, options=options)
-        return unless_faint(solved, (sunlit, known), known, options.error_budget)
+        known = expected_of(column, self.layers, self.directions, rest)
+        return twice_reflected((sunlit, known), options)
 
     def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:
         azimuth = self.column.relative_azimuth

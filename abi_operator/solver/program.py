@@ -1,6 +1,5 @@
 """From a tile of columns to what leaves its top: the solver's parts put together."""
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -19,7 +18,6 @@ from .method.adding import emitting_ground
 from .method.ground import black
 from .method.surface import AnySurface
 from .problem import Problem, seen_at_once
-from .skipping.faint import unless_faint
 
 _NO_SUN = How(single_scattering=False, error_budget=None, most=None)
 
@@ -101,15 +99,13 @@ def radiance_of_one_view(column: Column, options: Options) -> Float[Array, "*bat
     at_top = jnp.zeros_like(column.mu0) if levels is None else levels[0]
     at_once = seen_at_once(problem)
     shining = Shining(column, problem.layers, problem.directions, sun, Given(problem.doublings))
-    solved = partial(radiated, options=options)
     # Of grounds other than Lambertian nobody knows how they send thermal light to the view.
     unknown = levels is None or isinstance(column.albedo, AnySurface)
     if options.error_budget is None or unknown:
-        return at_top + sun * at_once[0] + solved(shining)
-    warm = warm_of(column, problem.layers, problem.directions, at_once, options)
+        return at_top + sun * at_once[0] + radiated(shining, options)
+    warm = warm_of(column, problem.layers, problem.directions, at_once)
     shining = shining._replace(given=shining.given._replace(warm=warm))
-    light = unless_faint(solved, shining, warm.known, options.error_budget)
-    return at_top + sun * at_once[0] + light
+    return at_top + sun * at_once[0] + radiated(shining, options)
 
 
 def over_black_ground(column: Column, options: Options) -> Float[Array, "view *batch"]:

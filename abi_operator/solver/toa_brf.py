@@ -5,6 +5,7 @@ from typing import Unpack
 from jaxtyping import Array, ArrayLike, Float
 
 from .._keywords import with_keywords
+from . import glimpse
 from .column import Column, Options, promoted
 from .door import solve
 from .method.surface import AnySurface
@@ -82,7 +83,8 @@ def toa_brf(
         secant=secant,
     )
     how = Settings(**settings)
-    return solve(_brf, column, how, gradient=_view_by_view if how.multiple_views else None)
+    gradient = _view_by_view if how.multiple_views else None
+    return solve(_brf, column, how, gradient=gradient, faint=glimpse.reflectance)
 
 
 def _brf(tile: Column, options: Options) -> Array:

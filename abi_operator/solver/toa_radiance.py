@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._keywords import with_keywords
+from . import glimpse
 from .column import Column, Options, promoted
 from .door import solve
 from .method.surface import AnySurface
@@ -86,7 +87,16 @@ def toa_radiance(
     )
     how = Settings(**settings)
     gradient = _view_by_view if how.multiple_views else None
-    return solve(_radiance, _with_harmless_sun(given), how, gradient=gradient, given=given)
+    # Of several views that see thermal light at once nothing is known before they are solved.
+    faint = None if how.multiple_views and _shines(given) else glimpse.radiance
+    column = _with_harmless_sun(given)
+    return solve(_radiance, column, how, gradient=gradient, faint=faint, given=given)
+
+
+def _shines(column: Column) -> bool:
+    """Whether there is light from elsewhere than the sun."""
+    others = column.planck_levels, column.surface_emission, column.isotropic_top
+    return any(x is not None for x in others)
 
 
 def _with_harmless_sun(column: Column) -> Column:
@@ -101,8 +111,7 @@ def _with_harmless_sun(column: Column) -> Column:
 
 def _radiance(tile: Column, options: Options) -> Array:
     assert tile.solar_irradiance is not None
-    shine = tile.planck_levels, tile.surface_emission, tile.isotropic_top
-    if tile.mu.shape[0] == 1 and any(x is not None for x in shine):
+    if tile.mu.shape[0] == 1 and _shines(tile):
         return radiance_of_one_view(tile, options)[None]
     brf, emitted = emerging(tile, options)
     reflected = tile.solar_irradiance * tile.mu0 / np.pi * brf

@@ -76,7 +76,7 @@ def _from_the_top(tau, scattering_ratio, phase_function, mu0, mu, sun_secants):
         x = secant * read(tau, k)
         through = jnp.exp(-x)
         own = read(scattering_ratio, k) * read(phase_function, k) / secant
-        return total + above * own * _lost(x, through), above * through
+        return total + above * own * extinguished(x, through), above * through
 
     start = jnp.zeros_like(mu * mu0), jnp.ones_like(mu * mu0)
     total, _ = jax.lax.fori_loop(0, tau.shape[0], one, start)
@@ -89,7 +89,7 @@ def _scattered_once_jvp(primals, tangents):
     return jax.jvp(fenced(_summed), primals, tangents)
 
 
-def _lost(x, through):
+def extinguished(x: Float[Array, "*n"], through: Float[Array, "*n"]) -> Float[Array, "*n"]:
     """1 - exp(-x) from exp(-x), by its series where a difference would lose digits."""
     series = jnp.ones_like(x)
     for k in range(_TERMS, 1, -1):

@@ -88,8 +88,6 @@ class Expected(NamedTuple):
     through
         Share of the beam that meets nothing on its way to the ground and back: at least the slope
         in the albedo of a Lambertian ground. [-]
-    faint
-        What the modes add up to if hardly anything is scattered; None where nobody knows.
     """
 
     added: Float[Array, "view *batch"]
@@ -97,7 +95,6 @@ class Expected(NamedTuple):
     dark: Float[Array, "*batch"]
     aside: Float[Array, "*batch"]
     through: Float[Array, "*batch"]
-    faint: Faint | None = None
 
 
 def expected(

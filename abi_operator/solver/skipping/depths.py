@@ -1,6 +1,7 @@
 """What the layers of columns add up to: all that is known of their light before they are solved
 hangs on it (`budget`, `faint`)."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -67,7 +68,7 @@ class Scattered(NamedTuple):
     Parameters
     ----------
     moments
-        :math:`\sum\omega\tau\chi_l`. [-]
+        :math:`\sum\omega\tau\chi_l` of each degree. [-]
     slant
         Scattering depth along the sun's beam. [-]
     over_absorbers
@@ -75,43 +76,6 @@ class Scattered(NamedTuple):
         below the middle of a layer. [-]
     """
 
-    moments: Float[Array, "degree *batch"]
+    moments: Sequence[Float[Array, "*batch"]]
     slant: Float[Array, "*batch"]
     over_absorbers: tuple[Float[Array, "*batch"], Float[Array, "*batch"]]
-
-
-def scattered(
-    tau: Float[Array, "layer *batch"],
-    ssa: Float[Array, "layer *batch"],
-    coalbedo: Float[Array, "layer *batch"],
-    moments: Float[Array, "layer degree *batch"],
-    sun_secants: Float[Array, "layer *batch"],
-) -> Scattered:
-    """In one pass over the layers; `moments` has degree 0.
-
-    Parameters
-    ----------
-    tau, ssa, coalbedo, moments
-        Of the layers. [-]
-    sun_secants
-        Of each layer's beam. [-]
-    """
-    layers = jax.lax.stop_gradient((tau, ssa, coalbedo, moments, sun_secants))
-    return Scattered(*one_kernel(_scattered, moments.shape[1])(*layers))
-
-
-def _scattered(*layers):
-    count = len(layers[0])
-
-    def one(k, sums):
-        found, slant, once, squared, below = sums
-        tau, ssa, coalbedo, moments, secant = (read(x, count - 1 - k) for x in layers)
-        scatters, absorbs = ssa * tau, coalbedo * tau
-        middle = below + 0.5 * absorbs
-        over = scatters * middle
-        found, slant = found + scatters * moments, slant + secant * scatters
-        return found, slant, once + over, squared + 0.5 * over * middle, below + absorbs
-
-    start = jnp.zeros_like(layers[3][0]), *(jnp.zeros_like(layers[0][0]),) * 4
-    found, slant, once, squared, _ = jax.lax.fori_loop(0, count, one, start)
-    return found, slant, (once, squared)

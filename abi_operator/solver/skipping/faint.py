@@ -25,23 +25,19 @@ share of what is scattered where light absorbs; and of the air's what is scatter
 .. math:: \frac{1}{4\mu_0\mu}\sum_l(2l+1)\left(\sum\omega\tau\chi_l\right)^2,
 
 where most of it goes. Where that is within the budget (`budget.OF_FAINT`) a column has this light
-instead of a sum over modes (`unless_faint`), and a tile of such columns is not solved. Derivatives
-are always those of the sum. `benchmarks/fit_faint.py` has what this misses beside that estimate.
+instead of a sum over modes, and is not solved (`solver.glimpse`). Derivatives are always those of
+the sum. `benchmarks/fit_faint.py` has what this misses beside that estimate.
 """
 
-from collections.abc import Callable
-from functools import cache, partial
-from typing import Any
+from collections.abc import Sequence
+from functools import cache
 
-import jax
 import jax.numpy as jnp
-from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 from numpy.polynomial import Legendre
 
 from ...machine.algebra import total
-from . import budget
-from .budget import Expected, Faint
+from .budget import Faint
 from .depths import DIFFUSE, Depths, Scattered
 
 _SCATTERED = 2.4  # mean secant of light that thin air sends on to all sides alike
@@ -92,7 +88,7 @@ def of_sunlight(
 
 
 def _forward(
-    moments: Float[Array, "degree *batch"], mu: Float[Array, "view *batch"]
+    moments: Sequence[Float[Array, "*batch"]], mu: Float[Array, "view *batch"]
 ) -> Float[Array, "view *batch"]:
     """F of the above."""
     found, before, here = moments[0] * jnp.ones_like(mu), jnp.ones_like(mu), mu
@@ -103,70 +99,19 @@ def _forward(
     return 0.5 * found
 
 
-def _back_to_ground(moments: Float[Array, "degree *batch"]) -> Float[Array, "*batch"]:
+def _back_to_ground(moments: Sequence[Float[Array, "*batch"]]) -> Float[Array, "*batch"]:
     """b of the above."""
     odd = range(1, len(moments), 2)
     return moments[0] - total([(2 * k + 1) * _half(k) ** 2 * moments[k] for k in odd])
 
 
-def _twice(moments: Float[Array, "degree *batch"]) -> Float[Array, "*batch"]:
+def _twice(moments: Sequence[Float[Array, "*batch"]]) -> Float[Array, "*batch"]:
     """What thin layers scatter to one another, times mu0 and mu; less where they are not thin."""
-    weight = 2 * jnp.arange(len(moments), dtype=moments.dtype) + 1
-    weight = weight.reshape(-1, *(1,) * (moments.ndim - 1))
-    return 0.25 * jnp.sum(weight * (moments / (1 + moments[0])) ** 2, axis=0)
+    per_depth = 1 / (1 + moments[0])
+    return total([(0.5 * k + 0.25) * (x * per_depth) ** 2 for k, x in enumerate(moments)])
 
 
 @cache
 def _half(degree: int) -> float:
     """Integral of a Legendre polynomial from 0 to 1."""
     return float(Legendre.basis(degree).integ()(1) - Legendre.basis(degree).integ()(0))
-
-
-def unless_faint(
-    solved: Callable[[Any], Array], inputs: Any, known: Expected, error_budget: float
-) -> Array:
-    """What is solved of the inputs, but where no more than the budget allows is missing of faint
-    light; derivatives are those of what is solved.
-
-    Nothing is solved where all columns are so, nor prepared for that: what only a solution needs
-    belongs into `solved`.
-
-    Parameters
-    ----------
-    solved
-        Gives light ``*view batch``; closes over nothing that is traced.
-    inputs
-        Its argument, a pytree of arrays.
-    known
-        Of the light of these columns.
-    error_budget
-        Relative error of it that may be made.
-    """
-    return solved(inputs) if known.faint is None else _unless(solved, error_budget, inputs, known)
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def _unless(solved, error_budget, inputs, known):
-    faint = known.faint
-    enough = faint.missing <= budget.OF_FAINT * error_budget * known.least
-    return jax.lax.cond(
-        jnp.all(enough),
-        lambda _: faint.light,
-        lambda inputs: jnp.where(enough, faint.light, solved(inputs)),
-        inputs,
-    )
-
-
-@partial(_unless.defjvp, symbolic_zeros=True)
-def _unless_jvp(solved, _error_budget, primals, tangents):
-    inputs, structure = jax.tree.flatten(primals[0])
-    changes = jax.tree.leaves(tangents[0])
-    moving = [k for k, x in enumerate(changes) if not isinstance(x, SymbolicZero)]
-
-    def of_moving(some):
-        every = list(inputs)
-        for k, x in zip(moving, some, strict=True):
-            every[k] = x
-        return solved(jax.tree.unflatten(structure, every))
-
-    return jax.jvp(of_moving, ([inputs[k] for k in moving],), ([changes[k] for k in moving],))

@@ -37,7 +37,12 @@ class Waves:
     def tile(self, leaves, what):
         return 8
 
-    def need(self, leaves):
+    @property
+    def need(self):
+        return None
+
+    @property
+    def at_once(self):
         return None
 
     def value(self, leaves):

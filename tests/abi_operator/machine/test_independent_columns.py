@@ -78,7 +78,12 @@ class Program(NamedTuple):
     def tile(self, leaves, what):
         return TILE
 
-    def need(self, leaves):
+    @property
+    def need(self):
+        return None
+
+    @property
+    def at_once(self):
         return None
 
     def value(self, leaves):

@@ -9,9 +9,9 @@ import pytest
 from surfaces import Constant
 
 from abi_operator.solver import toa_radiance
-from abi_operator.solver.skipping.faint_heat import passing
 from abi_operator.solver.skipping.grouping import Alike, Limits, grouped
 from abi_operator.solver.skipping.heat import unscattered
+from abi_operator.solver.skipping.one_pass import Air, known
 
 STREAMS, LAYERS, COLUMNS = 4, 12, 64
 DARK = 0.01  # reflectance below which errors are of that
@@ -117,10 +117,11 @@ def test_unscattered_light_does_not_depend_on_how_layers_are_cut():
     # Light of air that emits what it takes, as it is found from below.
     tau, planck = jnp.diff(depth)[:, None], jnp.asarray(planck)[:, None]
     whole = unscattered(tau, 1 + 0 * tau, planck[:-1], jnp.diff(planck, axis=0), secant, STREAMS)
-    found = passing(tau, 0 * tau, planck, 0 * secant, secant, STREAMS)
+    air = Air(tau, 0 * tau, jnp.zeros((12, STREAMS + 1, 1)), 0 * tau[:, None], planck=planck)
+    found = known(air, 1 / secant, 1 / secant[None], 0 * secant, STREAMS, True).passing
     np.testing.assert_allclose(found.up, whole.up, rtol=ROUNDING)
     np.testing.assert_allclose(found.down, whole.down, rtol=ROUNDING)
-    assert not found.turned.any()
+    assert not found.turned.any() and found.hottest == planck[-1]
     # By hand: 0.8 times the integral of (1 + 2 t) exp(-1.5 t) 1.5 from 0 to 3.
     through = np.exp(-4.5)
     wanted = 0.8 * (1 - 7 * through + 2 / 1.5 * (1 - through))
