@@ -9,7 +9,9 @@ from ...machine.algebra import fenced
 from ...machine.kernels import one_kernel
 from .mode_layers import read
 
-_THIN, _TERMS = 0.05, 8  # 1 - exp(-x) by so many terms of its series is right to rounding below
+# Below which 1 - exp(-x) is right to rounding by so many terms of its series, in double precision
+# and in single.
+_THIN, _TERMS, _TERMS_OF_FLOAT32 = 0.05, 8, 4
 
 
 def cos_scattering_angle(
@@ -91,8 +93,9 @@ def _scattered_once_jvp(primals, tangents):
 
 def extinguished(x: Float[Array, "*n"], through: Float[Array, "*n"]) -> Float[Array, "*n"]:
     """1 - exp(-x) from exp(-x), by its series where a difference would lose digits."""
+    terms = _TERMS if x.dtype == jnp.float64 else _TERMS_OF_FLOAT32
     series = jnp.ones_like(x)
-    for k in range(_TERMS, 1, -1):
+    for k in range(terms, 1, -1):
         series = 1 - x / k * series
     return jnp.where(x < _THIN, x * series, 1 - through)
 

@@ -23,10 +23,9 @@ from ...machine.algebra import total
 from ...machine.kernels import one_kernel
 from ..method.mode_layers import read
 from ..method.quadrature import double_gauss
+from ..method.single_scatter import extinguished
 from .budget import Expected
 from .grouping import Groups
-
-_THIN = 1e-4  # below which a rounding error over x counts for more than a term of its series
 
 
 class Warm(NamedTuple):
@@ -119,9 +118,9 @@ def _unscattered(layers, secant, nodes, number=None):
 def emissivities(x: Array) -> tuple[Array, Array, Array]:
     """Transmission, 1 less that, and how much of the increase leaves through the upper face."""
     through = jnp.exp(-x)
-    mean = 1 - through
-    thick = x > _THIN
-    ratio = jnp.where(thick, mean / jnp.where(thick, x, 1), 1 - 0.5 * x)
+    mean = extinguished(x, through)
+    some = x > 0
+    ratio = jnp.where(some, mean / jnp.where(some, x, 1), 1)
     return through, mean, ratio - through
 
 

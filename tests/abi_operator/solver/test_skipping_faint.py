@@ -5,6 +5,7 @@ from functools import cache
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from abi_operator.solver import toa_brf, toa_radiance
 from abi_operator.solver.gradient import emission, mode_sum
@@ -89,6 +90,50 @@ def test_a_column_is_faint_whoever_it_is_solved_with():
     np.testing.assert_allclose(found[:, 0], alone, rtol=1e-14)
     others = np.asarray(toa_brf(**thick, **HOW, error_budget=BUDGET))
     np.testing.assert_allclose(found[:, 1], others, rtol=ALONE)
+
+
+@pytest.mark.parametrize(
+    "of",
+    ["the sun on a sphere", "several views", "no delta-M", "a phase function", "one column"],
+)
+def test_what_a_column_may_be(of):
+    """Of whatever kind columns are, those that are not solved are within half of the budget."""
+    given, how = columns(scattered=5e-4), dict(HOW)
+    rng = np.random.default_rng(7)
+    count = given["mu0"].size
+    if of == "the sun on a sphere":
+        given = given | {"secant": rng.uniform(0.9, 1.3, (count, LAYERS)) / given["mu0"][:, None]}
+    elif of == "several views":
+        how["multiple_views"] = True
+        views = {"mu": (0.3, 1), "relative_azimuth": (0, np.pi)}
+        given = given | {k: rng.uniform(*ends, (count, 3)) for k, ends in views.items()}
+    elif of == "no delta-M":
+        how["delta_m"] = False
+    elif of == "a phase function":
+        given = given | {"phase_function": rng.uniform(0.5, 2, (count, LAYERS))}
+    else:
+        given = {k: x[:1] for k, x in given.items()}
+    whole, found = (np.asarray(toa_brf(**given, **how, error_budget=b)) for b in (None, BUDGET))
+    assert np.mean(found != whole) > 0.5
+    wrong = np.abs(found - whole) / np.maximum(whole, 0.01)
+    assert np.quantile(wrong, 0.99) < 0.5 * BUDGET
+
+
+def test_light_is_rounded_where_the_budget_has_room(monkeypatch):
+    """Of columns that are not solved it is that of single precision, within its rounding."""
+    given = columns(scattered=1e-5) | heat()
+
+    def light(error_budget):
+        return np.asarray(toa_radiance(**given, **HOW, error_budget=error_budget))
+
+    without_room = 0.5 * budget.SINGLE_FROM
+    rounded, small = light(BUDGET), light(without_room)
+    monkeypatch.setattr(budget, "SINGLE_FROM", np.inf)
+    # Budgets of their own, as above.
+    exact = light(BUDGET * (1 + 5e-9))
+    off = np.abs(rounded / exact - 1)
+    assert 1e-9 < np.median(off) and off.max() < 1e-6
+    np.testing.assert_allclose(small, light(without_room * (1 + 5e-9)), rtol=1e-14)
 
 
 def test_thermal_light_of_faint_columns():
