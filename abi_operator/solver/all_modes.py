@@ -1,7 +1,6 @@
 """What leaves the top of columns in all azimuth modes, from what all modes share.
 
-Whatever only a solution needs (Legendre functions, the ground, what is emitted) is prepared here,
-so that where nothing is solved (`skipping.faint`) it is not prepared either.
+Whatever all modes need alike (Legendre functions, the ground, what is emitted) is prepared here.
 """
 
 from typing import NamedTuple
