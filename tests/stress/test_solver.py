@@ -6,6 +6,7 @@ import pytest
 import stress
 import stress_truth
 from stress_checks import LIMITS, Judged, refused, value
+from stress_code import PACKAGE, sources, state_of_code
 from stress_columns import STRATA
 from stress_report import SIGNS
 
@@ -62,6 +63,18 @@ def test_signs_that_the_equations_have_are_told_from_those_of_rounding():
     row = int(np.argmin(np.where(columns["albedo"] == 0, value(columns, num_streams=2), 0)))
     assert stress_truth.falls(columns, row, 2)
     assert not stress_truth.falls(stress.columns_of(SUNLIT, 0, "float64").columns, 17, 2)
+
+
+def test_a_long_run_hangs_on_the_code_that_draws_solves_and_checks():
+    """And on nothing else, such as commands: what those files import is among them."""
+    found = {x.relative_to(PACKAGE).as_posix() for x in sources() if x.is_relative_to(PACKAGE)}
+    assert {"solver/door.py", "machine/told.py", "solver/skipping/one_pass.py"} <= found
+    assert {"optics/mie_phase.py", "ranges.py", "satellites.py", "planck.py"} <= found
+    assert any(x.startswith("optics/tables/") for x in found)
+    others = {"cli.py", "commands.py", "simulation.py", "bands_of_states.py"}
+    assert not others & found and not any(x.startswith(("scene/", "guard/")) for x in found)
+    assert {x.name for x in sources()} >= {"stress_columns.py", "stress_checks.py"}
+    assert state_of_code() == state_of_code()
 
 
 def test_columns_follow_from_the_name_of_their_batch():

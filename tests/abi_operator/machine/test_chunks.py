@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from heard import Heard
 
 from abi_operator.machine.chunks import begin_chunks, map_chunks
 from abi_operator.machine.cutting import cut
@@ -160,18 +161,7 @@ def test_nothing_is_cut_where_the_caller_says_what_runs_where():
 @pytest.mark.parametrize("size", [5, 64, 3000])
 def test_a_listener_is_told_of_every_column_and_of_what_is_compiled(size):
     """Of those that are solved twice, twice."""
-
-    class Listener:
-        def __init__(self):
-            self.columns, self.compiled = [], []
-
-        def solved(self, columns):
-            self.columns.append(columns)
-
-        def compiling(self, begins):
-            self.compiled.append(begins)
-
-    heard, later = Listener(), Listener()
+    heard, later = Heard(), Heard()
     call = (
         lambda x: jnp.asarray(x[0]),
         f"told of {size}",

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from heard import Heard
 
 from abi_operator import brf, quality_flags, radiance, smoke
 from abi_operator.files import InputError, Parts
@@ -261,20 +262,11 @@ def test_a_run_goes_on_where_one_has_ended_early(made, tmp_path, monkeypatch):
 
 
 def test_a_listener_hears_of_columns_as_they_are_solved(made):
-    class Listener:
-        columns = 0
-
-        def solved(self, columns):
-            self.columns += columns
-
-        def compiling(self, begins):
-            pass
-
-    listener = Listener()
+    listener = Heard()
     night = made.assign(quality_flag=made["quality_flag"].copy())
     night["quality_flag"][0] |= QUALITY_FLAGS["night"]
     simulate(night, listener=listener, **OPTIONS)
-    assert listener.columns == 4
+    assert sum(listener.columns) == 4
 
 
 def test_a_run_shows_how_far_it_is(made, monkeypatch):
