@@ -39,6 +39,8 @@ from .snow_and_ice import IceAlbedo
 from .species import PlumeSpecification, plume_variables
 from .standard_profile import nearest_standard_atmosphere, standard_profile
 
+_AIR_ABOVE = "US Standard Atmosphere 1976, scaled to the pressure at the model's top"
+
 
 def scenario(
     model: xr.Dataset,
@@ -215,18 +217,12 @@ def scenario(
     check_scenario(dataset, first_row=rows.start or 0)
     for sentence in condensate_warnings(condensate):
         warnings.warn(sentence, UserWarning, stacklevel=2)
-    attributes = {
-        "satellite": satellite,
-        "satellite_longitude": satellite_longitude,
-        "gases": gases_attribute(gases),
-        **optics_attributes(cloud_optics, ice_optics),
-        "sun_path": "flat" if flat_sun else "spherical",
-        "air_above_model": "US Standard Atmosphere 1976, scaled to the pressure at the model's top",
-        "num_levels_above_model": len(added_heights),
-    }
     return dataset.assign_attrs(
         model_attributes(model)
-        | attributes
+        | {"satellite": satellite, "satellite_longitude": satellite_longitude}
+        | {"gases": gases_attribute(gases), **optics_attributes(cloud_optics, ice_optics)}
+        | {"sun_path": "flat" if flat_sun else "spherical"}
+        | {"air_above_model": _AIR_ABOVE, "num_levels_above_model": len(added_heights)}
         | assumed
         | ground_sources
         | of_grounds
