@@ -46,9 +46,9 @@ def test_tiles_do_not_show(monkeypatch):
     tiles = []
     map_tiles = batching.map_tiles
 
-    def watched(function, leaves, width, need):
+    def watched(function, leaves, width, *others):
         tiles.append((leaves[0].shape[-1], width))
-        return map_tiles(function, leaves, width, need)
+        return map_tiles(function, leaves, width, *others)
 
     monkeypatch.setattr(batching, "map_tiles", watched)
     monkeypatch.setattr(sizes, "tile_size", lambda *_: 1)
