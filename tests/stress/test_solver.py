@@ -77,6 +77,11 @@ def test_a_long_run_hangs_on_the_code_that_draws_solves_and_checks():
     assert state_of_code() == state_of_code()
 
 
+def test_a_longer_step_compares_the_same_slope():
+    """Of one column, as the check does of a batch."""
+    assert 0 < stress.over_a_longer_step(SUNLIT, 0, 0, "float64") < LIMITS["slope"][0]
+
+
 def test_columns_follow_from_the_name_of_their_batch():
     """What makes a run that was stopped go on to the same bytes."""
     first, again = (stress.columns_of(SUNLIT, 3, "float64") for _ in range(2))
