@@ -7,9 +7,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Array, Float
 
 from ..machine.algebra import converted
 from .method.doublings import sufficient_doublings
+from .method.legendre import legendre_series
+from .method.single_scatter import cos_scattering_angle
 from .method.surface import AnySurface, Lambertian
 
 
@@ -160,6 +163,20 @@ def names(structure: Any) -> tuple[str, ...]:
     """Argument that each leaf of a column belongs to."""
     places = jax.tree.unflatten(structure, list(range(structure.num_leaves)))
     return tuple(name for name, _ in _leaves(places))
+
+
+def whole_moments(column: Column) -> Float[Array, "layer moment *batch"]:
+    """Moments of an aligned column, the zeroth of which is 1 and not read."""
+    moments = column.moments
+    return jnp.concatenate([jnp.ones_like(moments[:, :1]), moments[:, 1:]], axis=1)
+
+
+def phase_functions(column: Column) -> Float[Array, "layer view *batch"]:
+    """Of an aligned column, at the scattering angles: as given, else the sum of all moments. [-]"""
+    if column.phase_function is not None:
+        return column.phase_function
+    angle = cos_scattering_angle(column.mu0, column.mu, column.relative_azimuth)
+    return legendre_series(whole_moments(column), angle)
 
 
 def choose_doublings(column: Column, num_streams: int) -> int:

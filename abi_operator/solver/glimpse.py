@@ -13,10 +13,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..machine.kernels import one_kernel
-from .column import Column, Options
-from .method.legendre import legendre_series
+from .column import Column, Options, phase_functions
 from .method.rounding import in_single_precision
-from .method.single_scatter import cos_scattering_angle
 from .method.surface import AnySurface
 from .skipping import budget
 from .skipping.budget import expected
@@ -80,11 +78,7 @@ def radiance(column: Column, options: Options) -> Glimpse:
 
 def _glimpse(column: Column, options: Options) -> Glimpse:
     moments = column.moments[:, : options.num_streams + 1]
-    phase = column.phase_function
-    if phase is None:
-        angle = cos_scattering_angle(column.mu0, column.mu, column.relative_azimuth)
-        ones = jnp.ones_like(column.moments[:, :1])
-        phase = legendre_series(jnp.concatenate([ones, column.moments[:, 1:]], axis=1), angle)
+    phase = phase_functions(column)
     air = Air(column.tau, column.ssa, moments, phase, column.secant, column.planck_levels)
     of_heat = (column.solar_irradiance, column.surface_emission)
 

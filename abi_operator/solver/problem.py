@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .all_modes import Sunlit, twice_reflected
-from .column import Column, Options
+from .column import Column, Options, phase_functions, whole_moments
 from .foreknown import expected_of
 from .method.adding import Emission, Top
 from .method.azimuth import (
@@ -22,13 +22,8 @@ from .method.delta_m import ScaledLayers, unscaled
 from .method.delta_m import delta_m as scale_delta_m
 from .method.doublings import layer_doublings, within_reach
 from .method.ground import isotropic
-from .method.legendre import legendre_series
 from .method.rounding import within_single_precision
-from .method.single_scatter import (
-    cos_scattering_angle,
-    direct_transmission,
-    exact_single_scattering,
-)
+from .method.single_scatter import direct_transmission, exact_single_scattering
 from .method.surface import AnySurface
 
 
@@ -37,10 +32,9 @@ class Problem:
 
     def __init__(self, column: Column, options: Options):
         num_streams = options.num_streams
-        moments = column.moments  # the zeroth is 1 and not read
-        moments = jnp.concatenate([jnp.ones_like(moments[:, :1]), moments[:, 1:]], axis=1)
         scale = scale_delta_m if options.delta_m else unscaled
-        self.column, self.options, self.moments = column, options, moments
+        self.column, self.options = column, options
+        moments = whole_moments(column)
         self.layers: ScaledLayers = scale(column.tau, column.ssa, moments, num_streams)
         secant = 1 / column.mu0 if column.secant is None else column.secant
         self.directions = Directions(
@@ -116,9 +110,5 @@ def seen_at_once(problem: Problem) -> Float[Array, "view *batch"]:
         brf = brf + reflected * direct_transmission(layers.tau, mu, sun)
     if not options.tms:
         return brf
-    exact = column.phase_function
-    if exact is None:
-        angle = cos_scattering_angle(mu0, mu, column.relative_azimuth)
-        exact = legendre_series(problem.moments, angle)
-    ratio = layers.scattering_ratio
+    exact, ratio = phase_functions(column), layers.scattering_ratio
     return brf + exact_single_scattering(layers.tau, ratio, exact, mu0, mu, sun)

@@ -7,7 +7,6 @@ import xarray as xr
 from abi_operator.files import InputError
 from abi_operator.nomenclature import QUALITY_FLAGS
 from retrievals import ResultCode, retrieve_smoke
-from retrievals.inverse import DEFAULT_MINIMISER
 
 DARK, BRIGHT, CLOUDY = 0, 1, 2  # rows of a scene
 
@@ -54,8 +53,8 @@ def test_single_scattering_albedo_is_recovered_with_it(make_result):
     assert (retrieval["ssa_sigma"].where(success) > 0).sum() == 3 * success.sum()
     unaware = retrieve_smoke(known)
     assert (unaware["result_code"][DARK] == ResultCode.POOR_FIT).all()
-    # Of its own accord, though rounding may refuse the last steps, more of them on some processors.
-    assert (unaware["num_steps"][DARK] < DEFAULT_MINIMISER.max_steps).all()
+    # Though rounding may refuse the last steps, on some processors those of two rounds.
+    assert (unaware["num_steps"][DARK] <= 32).all()
 
 
 def test_times_and_refusals_keep_their_places(simulated):

@@ -6,7 +6,7 @@ import pytest
 import stress
 import stress_truth
 from stress_checks import LIMITS, Judged, refused, value
-from stress_code import PACKAGE, sources, state_of_code
+from stress_code import PACKAGE, sources
 from stress_columns import STRATA
 from stress_report import SIGNS
 
@@ -74,12 +74,11 @@ def test_a_long_run_hangs_on_the_code_that_draws_solves_and_checks():
     others = {"cli.py", "commands.py", "simulation.py", "bands_of_states.py"}
     assert not others & found and not any(x.startswith(("scene/", "guard/")) for x in found)
     assert {x.name for x in sources()} >= {"stress_columns.py", "stress_checks.py"}
-    assert state_of_code() == state_of_code()
 
 
 def test_a_longer_step_compares_the_same_slope():
     """Of one column, as the check does of a batch."""
-    assert 0 < stress.over_a_longer_step(SUNLIT, 0, 0, "float64") < LIMITS["slope"][0]
+    assert 0 < stress.over_a_longer_step(SUNLIT, 0, 0, "float64") < 1e-6
 
 
 def test_columns_follow_from_the_name_of_their_batch():

@@ -1,7 +1,6 @@
 """What the layers of columns add up to: all that is known of their light before they are solved
 hangs on it (`budget`, `faint`)."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -60,22 +59,3 @@ def _summed(*layers):
         return tuple(x + term for x, term in zip(sums, terms, strict=True))
 
     return jax.lax.fori_loop(0, len(layers[0]), one, (jnp.zeros_like(layers[0][0]),) * 4)
-
-
-class Scattered(NamedTuple):
-    r"""What of the layers scatters, and how; without derivatives.
-
-    Parameters
-    ----------
-    moments
-        :math:`\sum\omega\tau\chi_l` of each degree. [-]
-    slant
-        Scattering depth along the sun's beam. [-]
-    over_absorbers
-        :math:`\sum\omega\tau t` and :math:`\sum\omega\tau t^2/2`, with the depth t that absorbs
-        below the middle of a layer. [-]
-    """
-
-    moments: Sequence[Float[Array, "*batch"]]
-    slant: Float[Array, "*batch"]
-    over_absorbers: tuple[Float[Array, "*batch"], Float[Array, "*batch"]]

@@ -38,7 +38,8 @@ from numpy.polynomial import Legendre
 
 from ...machine.algebra import total
 from .budget import Faint
-from .depths import DIFFUSE, Depths, Scattered
+from .depths import DIFFUSE, Depths
+from .one_pass import Scattered
 
 _SCATTERED = 2.4  # mean secant of light that thin air sends on to all sides alike
 _UNSURE = 0.6  # share of what absorbs along it that is not known better

@@ -5,6 +5,7 @@ clear scene costs. The pass goes from the ground up, as light does that is emitt
 the way, and reads every layer once, as it was given: scaling by delta-M is part of it.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -15,7 +16,7 @@ from ...machine.algebra import total
 from ..method.mode_layers import read
 from ..method.quadrature import double_gauss
 from ..method.single_scatter import extinguished
-from .depths import Depths, Scattered
+from .depths import Depths
 from .heat import emissivities
 
 
@@ -51,6 +52,25 @@ class Passing(NamedTuple):
     down: Float[Array, "*batch"]
     turned: Float[Array, "*batch"]
     hottest: Float[Array, "*batch"]
+
+
+class Scattered(NamedTuple):
+    r"""What of the layers scatters, and how; without derivatives.
+
+    Parameters
+    ----------
+    moments
+        :math:`\sum\omega\tau\chi_l` of each degree. [-]
+    slant
+        Scattering depth along the sun's beam. [-]
+    over_absorbers
+        :math:`\sum\omega\tau t` and :math:`\sum\omega\tau t^2/2`, with the depth t that absorbs
+        below the middle of a layer. [-]
+    """
+
+    moments: Sequence[Float[Array, "*batch"]]
+    slant: Float[Array, "*batch"]
+    over_absorbers: tuple[Float[Array, "*batch"], Float[Array, "*batch"]]
 
 
 class Known(NamedTuple):

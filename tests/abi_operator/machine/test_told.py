@@ -39,7 +39,7 @@ def test_columns_that_are_told_keep_their_value(size, share, in_order):
 
 
 def test_only_the_others_are_solved():
-    """As many tiles as they fill, by what each tile says of itself; two of them for 12 of 64."""
+    """As many tiles as they fill, by what each tile says of itself; two of them for 11 of 64."""
     given = jnp.stack([jnp.zeros(64), jnp.where(jnp.arange(64) % 6 == 1, 1.0, -1.0)])
     others = int(jnp.sum(given[1] > 0))
     tiles = []
