@@ -171,9 +171,11 @@ def test_a_column_without_numbers_spoils_no_other():
 def test_two_views_at_once():
     """Both get what each gets alone, within the budget."""
     given, views = dict(columns()), np.array([0.5, 0.9])
-    given |= {"mu": np.broadcast_to(views, (96, 2)), "relative_azimuth": np.full((96, 2), 1.0)}
+    given |= {"relative_azimuth": np.ones(96)}
+    alone = [toa_brf(**given | {"mu": np.full(96, x)}, num_streams=STREAMS) for x in views]
+    exact = np.stack(alone, axis=1)
+    given |= {"mu": np.broadcast_to(views, (96, 2)), "relative_azimuth": np.ones((96, 2))}
     how = {"num_streams": STREAMS, "multiple_views": True}
-    exact = np.asarray(toa_brf(**given, **how))
     found = np.asarray(toa_brf(**given, **how, error_budget=1e-3))
     wrong = np.abs(found - exact) / np.maximum(exact, 0.01)
     assert np.quantile(wrong, 0.99) < 1e-3
@@ -214,19 +216,35 @@ def test_budgets_that_are_none(wrong):
 def layers(batch=5):
     rng = np.random.default_rng(0)
     tau = 10 ** rng.uniform(-3, 0, (LAYERS, batch))
-    rows = rng.uniform(0, 1, (LAYERS, 4, batch))
-    return jnp.asarray(tau), jnp.asarray(rows)
+    return tau, rng.uniform(0, 1, (LAYERS, 4, batch))
+
+
+@jax.jit
+def compiled(alike, limits):
+    return grouped(alike, limits)
+
+
+def groups_of(alike, limits):
+    """As one program for all that is alike in shape."""
+    return jax.tree.map(np.asarray, compiled(alike, limits))
+
+
+MERGED, HANDED_BACK = jax.jit(merged), jax.jit(handed_back)
+
+
+def limited(allowed, thickest=np.inf):
+    return Limits(np.full(5, 2.0), np.full(5, allowed), thickest)
 
 
 def test_alike_layers_are_one_group():
     tau, _ = layers()
     same = 0 * tau + 0.9
-    secant, allowed = jnp.full(5, 2.0), jnp.full(5, 1e-12)
-    limits = Limits(secant, allowed, np.inf)
-    groups = grouped(Alike(tau, same, 0.5 * same), limits)
+    limits = limited(1e-12)
+    groups = groups_of(Alike(tau, same, 0.5 * same), limits)
     assert groups.number == 1 and not groups.labels.any()
-    other = same.at[LAYERS // 2 :].set(0.1)
-    groups = grouped(Alike(tau, other, 0.5 * other), limits)
+    other = same.copy()
+    other[LAYERS // 2 :] = 0.1
+    groups = groups_of(Alike(tau, other, 0.5 * other), limits)
     assert groups.number == 2
     np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
 
@@ -234,11 +252,11 @@ def test_alike_layers_are_one_group():
 def test_layers_that_share_g_and_no_more_stay_apart():
     """Droplets of two sizes: delta-M brings their g together, and not their further moments."""
     tau, _ = layers()
-    same, further = 0 * tau + 1, jnp.where(jnp.arange(LAYERS)[:, None] < LAYERS // 2, 0.1, 0.2)
-    limits = Limits(jnp.full(5, 2.0), jnp.full(5, 1e-4), np.inf)
+    same, further = 0 * tau + 1, np.where(np.arange(LAYERS)[:, None] < LAYERS // 2, 0.1, 0.2)
+    limits = limited(1e-4)
     alike = Alike(tau, same, 0.75 * same)
-    assert grouped(alike, limits).number == 1
-    groups = grouped(alike._replace(further=further * same), limits)
+    assert groups_of(alike, limits).number == 1
+    groups = groups_of(alike._replace(further=further * same), limits)
     assert groups.number == 2
     np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
 
@@ -246,11 +264,11 @@ def test_layers_that_share_g_and_no_more_stay_apart():
 def test_a_thin_black_layer_is_not_spread_through_a_thick_white_one():
     """Under a layer that only scatters nobody sees it, and in one a little of it is much."""
     tau, _ = layers()
-    first = jnp.arange(LAYERS)[:, None] == 0
-    tau = jnp.where(first, 1e3, 0.05 / LAYERS + 0 * tau)
-    white = jnp.where(first, 1.0, 0 * tau)
-    limits = Limits(jnp.full(5, 2.0), jnp.full(5, 3e-4), np.inf)
-    groups = grouped(Alike(tau, white, 0 * tau), limits)
+    first = np.arange(LAYERS)[:, None] == 0
+    tau = np.where(first, 1e3, 0.05 / LAYERS + 0 * tau)
+    white = np.where(first, 1.0, 0 * tau)
+    limits = limited(3e-4)
+    groups = groups_of(Alike(tau, white, 0 * tau), limits)
     np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) > 0)
 
 
@@ -268,9 +286,9 @@ def test_one_layer_and_more_columns_than_a_tile():
 def test_no_group_is_thicker_than_it_may_be():
     tau, _ = layers()
     same = 0 * tau + 0.9
-    groups = grouped(Alike(tau, same, same), Limits(jnp.full(5, 2.0), jnp.full(5, 1.0), 2.0))
+    groups = groups_of(Alike(tau, same, same), limited(1.0, 2.0))
     for column in range(5):
-        labels = np.asarray(groups.labels[:, column])
+        labels = groups.labels[:, column]
         for label in np.unique(labels):
             members = labels == label
             depth = 4 * float(tau[members, column].sum())  # on the way down and up
@@ -280,27 +298,24 @@ def test_no_group_is_thicker_than_it_may_be():
 def test_groups_have_sums_and_means():
     tau, rows = layers()
     rng = np.random.default_rng(1)
-    uneven = jnp.asarray(rng.uniform(0, 1, tau.shape))
-    groups = grouped(
-        Alike(tau, uneven, uneven), Limits(jnp.full(5, 2.0), jnp.full(5, 0.02), np.inf)
-    )
-    depth, means = merged(groups, tau, rows)
+    uneven = rng.uniform(0, 1, tau.shape)
+    groups = groups_of(Alike(tau, uneven, uneven), limited(0.02))
+    depth, means = (np.asarray(x) for x in MERGED(groups, tau, rows))
     for column in range(5):
-        labels = np.asarray(groups.labels[:, column]).astype(int)
+        labels = groups.labels[:, column].astype(int)
         for k in range(labels.max() + 1):
             members = labels == k
-            t = np.asarray(tau)[members, column]
+            t = tau[members, column]
             np.testing.assert_allclose(depth[k, column], t.sum(), rtol=ROUNDING)
-            mean = t @ np.asarray(rows)[members, :, column] / t.sum()
+            mean = t @ rows[members, :, column] / t.sum()
             np.testing.assert_allclose(means[k, :, column], mean, rtol=ROUNDING)
 
 
 def test_slopes_handed_back_add_up():
     """Members' slopes times what they have sum to the group's, and a straight line is kept."""
     tau, rows = layers()
-    allowed = jnp.full(5, np.inf)
-    groups = grouped(Alike(tau, rows[:, 0], rows[:, 1]), Limits(jnp.full(5, 2.0), allowed, np.inf))
-    depth, means = merged(groups, tau, rows)
+    groups = groups_of(Alike(tau, rows[:, 0], rows[:, 1]), limited(np.inf))
+    depth, means = (np.asarray(x) for x in MERGED(groups, tau, rows))
     upper, lower = np.linspace(1, 2, 5)[:, None], np.linspace(-1, 3, 5)[:, None]
     faces = np.zeros((LAYERS + 1, 5, 5))
     faces[0], faces[1] = upper, lower
@@ -309,8 +324,8 @@ def test_slopes_handed_back_add_up():
     row_slopes[0] = mean[1:] * depth[0]
     tau_slopes = np.zeros(tau.shape)
     tau_slopes[0] = mean[0] + np.sum(mean[1:] * means[0], axis=0)
-    solved = Solved(depth, means, *(jnp.asarray(x) for x in (tau_slopes, row_slopes, faces)))
-    of_tau, of_rows = handed_back(groups, tau, rows, solved)
+    solved = Solved(depth, means, tau_slopes, row_slopes, faces)
+    of_tau, of_rows = (np.asarray(x) for x in HANDED_BACK(groups, tau, rows, solved))
     np.testing.assert_allclose(of_rows.sum(axis=0), row_slopes[0], rtol=1e-12)
     place = (np.cumsum(tau, axis=0) - 0.5 * tau) / depth[0]
     line = upper + (lower - upper) * place[:, None]
