@@ -1,4 +1,4 @@
-"""The derivative of thermal light, written out, against reverse mode and differences."""
+"""The derivative of thermal light, written out, against forward mode and differences."""
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +13,7 @@ from tiles import (
     direction,
     options,
     tile,
+    value_and_slopes_by_forward_mode,
     value_and_slopes_of,
 )
 
@@ -41,9 +42,9 @@ def plain(column, how):
         pytest.param(8, 4, True, True, marks=pytest.mark.slow),
     ],
 )
-def test_equals_reverse_mode(num_streams, num_doublings, tms, general):
+def test_equals_forward_mode(num_streams, num_doublings, tms, general):
     column, how = tile(num_streams, general), options(num_streams, num_doublings, tms)
-    expected, slopes = value_and_slopes_of(plain, how)(column)
+    expected, slopes = value_and_slopes_by_forward_mode(plain, how)(column)
     value, ours = value_and_slopes_of(radiance_of_one_view, how)(column)
     np.testing.assert_allclose(value, expected, rtol=AGREE)
     assert_slopes_agree(ours, slopes)
@@ -64,17 +65,22 @@ def total(*arguments):
     return jnp.sum(radiance(*arguments))
 
 
-GRADIENT = jax.grad(total, argnums=ALL)
+# Values are those that come with slopes: one program for both.
+BOTH = jax.value_and_grad(total, argnums=ALL)
+
+
+def gradient(*arguments):
+    return [np.asarray(x) for x in BOTH(*arguments)[1]]
 
 
 def test_forward_reverse_and_differences_agree():
     inputs = arguments()
     tangents = direction(inputs)
-    slopes = GRADIENT(*inputs)
+    slopes = gradient(*inputs)
     forward = jax.jvp(total, tuple(inputs), tuple(tangents))[1]
-    reverse = sum(jnp.sum(x * t) for x, t in zip(slopes, tangents, strict=True))
+    reverse = sum(np.sum(x * np.asarray(t)) for x, t in zip(slopes, tangents, strict=True))
     np.testing.assert_allclose(forward, reverse, rtol=1e-12)
-    (difference,) = differences(lambda *x: [total(*x)], inputs, tangents)
+    (difference,) = differences(lambda *x: [BOTH(*x)[0]], inputs, tangents)
     np.testing.assert_allclose(forward, difference, rtol=DIFFERENCES_AGREE)
 
 
@@ -82,7 +88,7 @@ def test_an_empty_layer_is_the_limit_of_a_thin_one():
     """Although the Planck function jumps across it; all that is left is the next order in tau."""
     inputs = arguments()
     thin = [jnp.where(inputs[0] == 0, 1e-9, inputs[0]), *inputs[1:]]
-    for name, empty, limit in zip(NAMES, GRADIENT(*inputs), GRADIENT(*thin), strict=True):
+    for name, empty, limit in zip(NAMES, gradient(*inputs), gradient(*thin), strict=True):
         assert np.isfinite(empty).all(), name
         np.testing.assert_allclose(empty, limit, atol=3e-8 * np.abs(limit).max(), err_msg=name)
 
@@ -90,7 +96,7 @@ def test_an_empty_layer_is_the_limit_of_a_thin_one():
 def test_compiled_and_mapped_it_is_the_gradient_of_the_batch():
     inputs = arguments()
     mapped = jax.jit(jax.vmap(jax.grad(radiance, argnums=ALL)))(*inputs)
-    for name, found, expected in zip(NAMES, mapped, GRADIENT(*inputs), strict=True):
+    for name, found, expected in zip(NAMES, mapped, gradient(*inputs), strict=True):
         atol = AGREE * np.abs(expected).max()
         np.testing.assert_allclose(found, expected, rtol=0, atol=atol, err_msg=name)
 
@@ -105,7 +111,7 @@ def test_two_views_have_the_slopes_of_each_alone():
 
     together = jax.jacrev(of_both, argnums=ALL)(*inputs[:5], *views, *inputs[7:])
     for k in range(2):
-        alone = GRADIENT(*inputs[:5], views[0][:, k], views[1][:, k], *inputs[7:])
+        alone = gradient(*inputs[:5], views[0][:, k], views[1][:, k], *inputs[7:])
         for name, both, expected in zip(NAMES, together, alone, strict=True):
             found = both[k, :, k] if name in ("mu", "relative_azimuth") else both[k]
             atol = AGREE * np.abs(expected).max()
@@ -122,7 +128,7 @@ def test_one_layer_alone():
     levels = jnp.concatenate([one[8], one[8][:, 1:]], axis=1)
     two = [tau, ssa, moments, *one[3:8], levels, *one[9:]]
     np.testing.assert_allclose(radiance(*one), radiance(*two), rtol=AGREE)
-    for name, found, expected in zip(NAMES, GRADIENT(*one), GRADIENT(*two), strict=True):
+    for name, found, expected in zip(NAMES, gradient(*one), gradient(*two), strict=True):
         if name == "planck_levels":
             expected = jnp.stack([expected[:, 0], expected[:, 1] + expected[:, 2]], axis=1)
         elif found.ndim > 1:
@@ -133,10 +139,10 @@ def test_one_layer_alone():
 
 def test_single_precision():
     """Finite and as accurate as the type allows, in the empty layer with its jump, too."""
-    expected, slopes = total(*arguments()), GRADIENT(*arguments())
-    single = arguments(dtype=jnp.float32)
-    np.testing.assert_allclose(total(*single), expected, rtol=1e-6)
-    for name, found, right in zip(NAMES, GRADIENT(*single), slopes, strict=True):
+    expected, slopes = BOTH(*arguments())
+    value, single = BOTH(*arguments(dtype=jnp.float32))
+    np.testing.assert_allclose(value, expected, rtol=1e-6)
+    for name, found, right in zip(NAMES, single, slopes, strict=True):
         assert found.dtype == jnp.float32
         assert np.isfinite(found).all(), name
         atol = SINGLE * np.abs(right).max()
@@ -151,14 +157,16 @@ def test_second_derivatives(order):
     inputs = inputs[0] + 0.3, *inputs[1:]
     tangents = tuple(0.1 * x for x in direction(inputs))
 
+    slopes = jax.grad(total, argnums=ALL)
+
     def along(*inputs):
-        return sum(jnp.sum(x * t) for x, t in zip(GRADIENT(*inputs), tangents, strict=True))
+        return sum(jnp.sum(x * t) for x, t in zip(slopes(*inputs), tangents, strict=True))
 
     if order == "forward":
-        second = jax.jit(lambda *x: jax.jvp(GRADIENT, x, tangents)[1])(*inputs)
+        second = jax.jit(lambda *x: jax.jvp(slopes, x, tangents)[1])(*inputs)
     else:
         second = jax.jit(jax.grad(along, argnums=ALL))(*inputs)
-    expected = differences(GRADIENT, inputs, tangents)
+    expected = differences(gradient, inputs, tangents)
     for name, found, difference in zip(NAMES, second, expected, strict=True):
         atol = DIFFERENCES_AGREE * (np.abs(found).max() + 1)
         np.testing.assert_allclose(found, difference, rtol=0, atol=atol, err_msg=name)
