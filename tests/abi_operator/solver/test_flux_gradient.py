@@ -7,6 +7,7 @@ import pytest
 from tiles import (
     AGREE,
     DIFFERENCES_AGREE,
+    STEP,
     arguments,
     assert_slopes_agree,
     differences,
@@ -16,7 +17,7 @@ from tiles import (
     value_and_slopes_of,
 )
 
-from abi_operator.solver import surface_coupling, toa_albedo
+from abi_operator.solver import surface_coupling, toa_albedo, toa_brf
 from abi_operator.solver.albedo import response_and_slopes
 from abi_operator.solver.column import Column
 from abi_operator.solver.program import emerging, ground_response, plane_albedo
@@ -60,20 +61,66 @@ def test_plane_albedo_equals_reverse_mode(num_streams):
     assert_slopes_agree(ours, slopes)
 
 
+def albedo_of(tau, ssa, moments, albedo, mu0, *_):
+    return toa_albedo(tau, ssa, moments, albedo, mu0, **OPTIONS)
+
+
+def response_of(tau, ssa, moments, _, mu0, mu, azimuth):
+    return surface_coupling(tau, ssa, moments, mu0, mu, azimuth, **OPTIONS)
+
+
+def fluxes(*inputs):
+    """Of all that doors give, weighted."""
+    response = response_of(*inputs)
+    others = response.brf_black, 3 * response.coupling, 7 * response.spherical_albedo
+    return jnp.sum(albedo_of(*inputs)) + sum(map(jnp.sum, others))
+
+
+ALL = tuple(range(7))
+# Differences are of the values that come with slopes, by the programs of these.
+BOTH = jax.value_and_grad(fluxes, argnums=ALL)
+
+
 def test_slopes_of_fluxes_agree_with_differences():
-    """Of all that doors give, weighted, along a direction in all inputs."""
+    """Along a direction in all inputs."""
     inputs = arguments()[:7]
     tangents = direction(inputs)
-
-    def fluxes(tau, ssa, moments, albedo, mu0, mu, azimuth):
-        plane = toa_albedo(tau, ssa, moments, albedo, mu0, **OPTIONS)
-        response = surface_coupling(tau, ssa, moments, mu0, mu, azimuth, **OPTIONS)
-        others = response.brf_black, 3 * response.coupling, 7 * response.spherical_albedo
-        return jnp.sum(plane) + sum(map(jnp.sum, others))
-
     forward = jax.jvp(fluxes, tuple(inputs), tuple(tangents))[1]
-    slopes = jax.grad(fluxes, argnums=tuple(range(7)))(*inputs)
-    reverse = sum(jnp.sum(x * t) for x, t in zip(slopes, tangents, strict=True))
+    slopes = BOTH(*inputs)[1]
+    reverse = sum(np.sum(np.asarray(x) * t) for x, t in zip(slopes, tangents, strict=True))
     np.testing.assert_allclose(forward, reverse, rtol=1e-12)
-    (difference,) = differences(lambda *x: [fluxes(*x)], inputs, tangents)
+    (difference,) = differences(lambda *x: [BOTH(*x)[0]], inputs, tangents)
     np.testing.assert_allclose(forward, difference, rtol=DIFFERENCES_AGREE)
+
+
+def test_derivatives_of_the_closed_form():
+    inputs = arguments()[:7]
+
+    def by_coupling(*inputs):
+        return jnp.sum(response_of(*inputs).brf(inputs[3]))
+
+    def directly(*inputs):
+        return jnp.sum(toa_brf(*inputs, **OPTIONS))
+
+    for found, expected in zip(
+        jax.grad(by_coupling, argnums=ALL)(*inputs),
+        jax.grad(directly, argnums=ALL)(*inputs),
+        strict=True,
+    ):
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-13)
+
+
+def test_derivative_of_the_plane_albedo():
+    """Of each column, in the thickness of one layer."""
+    tau, *others = arguments()[:7]
+
+    def slope(tau):
+        """As part of all slopes, for the program that there is."""
+        value, pull_back = jax.vjp(albedo_of, tau, *others)
+        return np.asarray(value), np.asarray(pull_back(jnp.ones_like(value))[0])
+
+    step = np.zeros(tau.shape)
+    step[:, 0] = STEP
+    (ahead, _), (behind, _) = slope(tau + step), slope(tau - step)
+    difference = (ahead - behind) / (2 * STEP)
+    np.testing.assert_allclose(slope(tau)[1][:, 0], difference, rtol=DIFFERENCES_AGREE)
