@@ -36,7 +36,7 @@ def test_double_gauss_integrates_polynomials(num_streams):
 
 def test_legendre_functions_satisfy_the_addition_theorem():
     mu, other, azimuth = 0.3, 0.8, 1.1
-    p = np.asarray(associated_legendre(12, 12, jnp.asarray([mu, other])))
+    p = np.asarray(jax.jit(lambda x: associated_legendre(12, 12, x))(jnp.asarray([mu, other])))
     series = [
         sum((2 - (m == 0)) * p[m, l, 0] * p[m, l, 1] * np.cos(m * azimuth) for m in range(12))
         for l in range(12)  # noqa: E741
@@ -58,11 +58,12 @@ def test_legendre_series_sums_henyey_greenstein():
 def test_delta_m_leaves_absorption_and_mean_forward_scattering_alone():
     """tau (1 - omega) and tau (1 - omega g), and the co-albedo below rounding of 1 - omega."""
     rng = np.random.default_rng(4)
-    tau, ssa = jnp.asarray(rng.uniform(0, 9, (3, 5))), jnp.asarray(rng.uniform(0, 1, (3, 5)))
-    ssa = ssa.at[0].set(1 - 1e-15)
-    g = jnp.asarray(rng.uniform(-0.5, 0.95, (3, 5)))
-    moments = g[:, None] ** jnp.arange(9.0)[None, :, None]
-    scaled = delta_m(tau, ssa, moments, 8)
+    tau, ssa = rng.uniform(0, 9, (3, 5)), rng.uniform(0, 1, (3, 5))
+    ssa[0] = 1 - 1e-15
+    g = rng.uniform(-0.5, 0.95, (3, 5))
+    moments = g[:, None] ** np.arange(9.0)[None, :, None]
+    scaled = jax.jit(delta_m, static_argnums=3)(tau, ssa, moments, 8)
+    scaled = jax.tree.map(np.asarray, scaled)
     np.testing.assert_allclose(scaled.tau * scaled.coalbedo, tau * (1 - ssa), rtol=1e-14)
     np.testing.assert_allclose(
         scaled.tau * (1 - scaled.ssa * scaled.moments[:, 1]), tau * (1 - ssa * g), rtol=1e-13
@@ -76,11 +77,16 @@ def test_bordered_matrices_act_on_light_without_a_sun():
     vector = Vector(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=2)))
     # With the sun as a view, which its symmetric kind allows, the matrix is this one.
     plain = np.append(vector.nodes, vector.beams)
-    np.testing.assert_allclose(np.append(*leaves(a @ vector)), as_views(a) @ plain, rtol=1e-12)
-    _, quotient = minus_and_quotient([(1.0, a)], jnp.ones(()), a, b, a)
+
+    @jax.jit
+    def actions(a, b, vector):
+        _, quotient = minus_and_quotient([(1.0, a)], jnp.ones(()), a, b, a)
+        return a @ vector, quotient.transposed_action(vector)
+
+    direct, through = (np.append(*leaves(x)) for x in actions(a, b, vector))
+    np.testing.assert_allclose(direct, as_views(a) @ plain, rtol=1e-12)
     expected = as_views(a) @ np.linalg.inv(as_views(b)) @ plain
-    found = np.append(*leaves(quotient.transposed_action(vector)))
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    np.testing.assert_allclose(through, expected, rtol=1e-12)
 
 
 def leaves(vector):
@@ -151,13 +157,11 @@ def test_bordered_algebra_is_matrix_algebra(nodes):
 def test_kernels_read_the_same_alone_and_in_a_batch():
     rng = np.random.default_rng(1)
     batch = random_bordered(rng, batch=(5,)), random_bordered(rng, batch=(5,))
-    tau = jnp.asarray(rng.uniform(0, 2, 5))
+    tau = rng.uniform(0, 2, 5)
     admittance = jax.jit(lambda *x: half_layer(*x, doublings_of_a_layer(2))[0].core)
-    together = admittance(*batch, tau)
+    together = np.asarray(admittance(*batch, tau))
     for i in range(5):
-        a, b = (
-            Bordered(*(x[..., i] for x in (m.core, m.border, m.diagonal, m.corner))) for m in batch
-        )
+        a, b = (jax.tree.map(lambda x, i=i: jnp.asarray(np.asarray(x)[..., i]), m) for m in batch)
         np.testing.assert_allclose(admittance(a, b, tau[i]), together[..., i], rtol=1e-12)
 
 
@@ -165,7 +169,7 @@ def test_kernels_read_the_same_alone_and_in_a_batch():
 def test_inverse_of_positive_definite_matrices(n):
     rng = np.random.default_rng(n)
     root = rng.normal(size=(n, n, 7))
-    a = jnp.asarray(np.einsum("ikb,jkb->ijb", root, root)) + jnp.eye(n)[..., None]
+    a = np.einsum("ikb,jkb->ijb", root, root) + np.eye(n)[..., None]
     identity = np.broadcast_to(np.eye(n)[..., None], a.shape)
     product = jax.jit(lambda a: matmul(a, inverse(a)))(a)
     np.testing.assert_allclose(product, identity, atol=1e-12)
@@ -178,9 +182,9 @@ def test_quotients_of_positive_definite_matrices(n):
     """By halves of halves, and their derivative, which is written out, against differences."""
     rng = np.random.default_rng(n)
     root, change = rng.normal(size=(2, n, n, 7))
-    a = jnp.asarray(np.einsum("ikb,jkb->ijb", root, root)) + jnp.eye(n)[..., None]
-    rights = [jnp.asarray(rng.normal(size=(n, columns, 7))) for columns in (n, 2)]
-    da = jnp.asarray(change + np.swapaxes(change, 0, 1))
+    a = np.einsum("ikb,jkb->ijb", root, root) + np.eye(n)[..., None]
+    rights = [rng.normal(size=(n, columns, 7)) for columns in (n, 2)]
+    da = change + np.swapaxes(change, 0, 1)
 
     @jax.jit
     def along(step):
@@ -189,7 +193,8 @@ def test_quotients_of_positive_definite_matrices(n):
     found, slopes = jax.jit(lambda step: jax.jvp(along, (step,), (1.0,)))(0.0)
     for x, right in zip(found, rights, strict=True):
         np.testing.assert_allclose(np.einsum("ijb,jkb->ikb", a, x), right, atol=1e-11)
-    for slope, above, below in zip(slopes, along(1e-5), along(-1e-5), strict=True):
+    ends = (map(np.asarray, along(step)) for step in (1e-5, -1e-5))
+    for slope, above, below in zip(slopes, *ends, strict=True):
         scale = np.abs(slope).max()  # differences of 1e-5 are right to 1e-10 of what they divide
         np.testing.assert_allclose(slope, (above - below) / 2e-5, atol=1e-6 * scale)
 
@@ -241,12 +246,13 @@ def test_each_layer_is_doubled_as_its_thickest_column_needs():
     tau = np.full((6, 3), 1e-9)
     tau[:5, 1] = 2 * smallest * np.array([0.9 * _REACH[0], 1.1 * _REACH[0], 1.0, 200, 1e38])
     tau[5] = np.nan, np.inf, 1e-9
-    secants = np.ones((2, 6, 3))
-    numbers = layer_doublings(jnp.asarray(tau), jnp.asarray(secants), 8, None).numbers
+    secants, low = np.ones((2, 6, 3)), np.ones((2, 6, 3))
+    low[1] = 1e3
+    chosen = jax.jit(lambda *x: layer_doublings(*x, 8, None).numbers)
+    numbers, grazing = (np.asarray(chosen(tau, x)) for x in (secants, low))
     np.testing.assert_array_equal(numbers[:, 0], [0, 1, 4, 5, 64, 0])
-    np.testing.assert_array_equal(numbers[:, 1], 0.5 / 2 ** np.asarray(numbers[:, 0]))
-    grazing = layer_doublings(jnp.asarray(tau), jnp.asarray(secants).at[1].set(1e3), 8, None)
-    assert np.all(grazing.numbers[:5, 0] >= numbers[:5, 0]) and grazing.numbers[3, 0] == 8
+    np.testing.assert_array_equal(numbers[:, 1], 0.5 / 2 ** numbers[:, 0])
+    assert np.all(grazing[:5, 0] >= numbers[:5, 0]) and grazing[3, 0] == 8
 
 
 def doublings_of_a_layer(number):
@@ -256,19 +262,21 @@ def doublings_of_a_layer(number):
 HALF_LAYER = jax.jit(lambda a, p, tau, numbers: half_layer(a, p, tau, Doublings(numbers, None)))
 
 
+UNIT = np.ones((1, 1, 50)), np.zeros((1, 2, 50)), np.ones((2, 50)), np.zeros((1, 50))
+
+
 @pytest.mark.parametrize("doublings", range(7))
 def test_half_layer_is_tanh_up_to_the_reach_of_its_doublings(doublings):
     """One node with a = b = 1: admittance tanh(h), impedance h coth(h), h = tau / 2."""
     reach = _REACH[doublings] if doublings < 5 else _REACH[4] * 4 ** (doublings - 4)
-    tau = jnp.asarray(2 * reach * np.linspace(1e-3, 1, 50))
-    ones = jnp.ones((1, 1, 50))
-    unit = Bordered(ones, 0 * jnp.ones((1, 2, 50)), jnp.ones((2, 50)), jnp.zeros((1, 50)))
+    tau = 2 * reach * np.linspace(1e-3, 1, 50)
+    unit = Bordered(*map(jnp.asarray, UNIT))
     numbers = doublings_of_a_layer(doublings).numbers
     admittance, impedance = HALF_LAYER(unit, unit, tau, numbers)
     h = np.asarray(tau) / 2
     for found, exact in ((admittance, np.tanh(h)), (impedance, h / np.tanh(h))):
-        np.testing.assert_allclose(found.core[0, 0], exact, rtol=REACH_ERROR)
-        np.testing.assert_allclose(found.diagonal[0], exact, rtol=REACH_ERROR)
+        for entry in (np.asarray(found.core)[0, 0], np.asarray(found.diagonal)[0]):
+            np.testing.assert_allclose(entry, exact, rtol=REACH_ERROR)
 
 
 @pytest.mark.parametrize(("dtype", "digits"), [(np.float64, 1e-13), (np.float32, 2e-6)])
@@ -279,7 +287,7 @@ def test_light_scattered_once_keeps_its_digits(dtype, digits):
     arrays = tau, np.full_like(tau, 0.9), np.ones((2, 1, 20), dtype)
     mu0, mu = np.full(20, 0.5, dtype), np.full((1, 20), 0.7, dtype)
     sun = np.full_like(tau, 2)
-    found = exact_single_scattering(*map(jnp.asarray, (*arrays, mu0, mu, sun)))
+    found = jax.jit(exact_single_scattering)(*arrays, mu0, mu, sun)
     assert found.dtype == dtype
     secant = 2 + 1 / mu[0].astype(float)
     first, second = -np.expm1(-secant * tau.astype(float))

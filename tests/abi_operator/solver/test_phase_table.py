@@ -32,10 +32,19 @@ def henyey_greenstein(cosine, g=ASYMMETRY):
     return (1 - g**2) / (1 + g**2 - 2 * g * cosine) ** 1.5
 
 
+@cache
+def interpolation(angles, **options):
+    grid = np.array(angles)
+    return jax.jit(lambda t, c: interpolate_phase_function(t, grid, c, **options))
+
+
 def interpolated(table, grid, cosine, **options):
-    """`interpolate_phase_function` as one program; one operation at a time compiles for longer."""
-    compiled = jax.jit(lambda t, c: interpolate_phase_function(t, grid, c, **options))
-    return compiled(table, cosine)
+    """`interpolate_phase_function` as one program for all that is alike in shape; one operation at
+    a time compiles for longer."""
+    return interpolation(tuple(grid), **options)(table, cosine)
+
+
+MIXED = jax.jit(mix_phase_functions, static_argnames="multiple_views")
 
 
 @cache
@@ -187,15 +196,10 @@ def test_exact_backscatter_is_stationary_in_every_direction():
 def test_derivatives_are_those_of_central_differences():
     grid = uneven_grid()
     rng = np.random.default_rng(2)
-    table = jnp.asarray(rng.uniform(1, 2, (2, 181)))
-    cosine = jnp.asarray(rng.uniform(-0.9, 0.9, 5))
-
-    @jax.jit
-    def values(table, cosine):
-        return interpolate_phase_function(table, grid, cosine)
-
-    tangents = jnp.asarray(rng.normal(size=(2, 181))), jnp.asarray(rng.normal(size=5))
-    forward = jax.jvp(values, (table, cosine), tangents)[1]
+    table, cosine = rng.uniform(1, 2, (2, 181)), rng.uniform(-0.9, 0.9, 5)
+    values = interpolation(tuple(grid))
+    tangents = rng.normal(size=(2, 181)), rng.normal(size=5)
+    forward = np.asarray(jax.jvp(values, (table, cosine), tangents)[1])
     step = 1e-6
     ahead, behind = (
         values(*(x + sign * step * t for x, t in zip((table, cosine), tangents, strict=True)))
@@ -203,25 +207,24 @@ def test_derivatives_are_those_of_central_differences():
     )
     # Curvature in the cosine is some 1e4, its jumps at nodes as much.
     np.testing.assert_allclose(forward, (ahead - behind) / (2 * step), rtol=1e-5, atol=1e-5)
-    weight = jnp.asarray(rng.normal(size=forward.shape))
-    pulled = jax.vjp(values, table, cosine)[1](weight)
-    both = sum(jnp.sum(p * t) for p, t in zip(pulled, tangents, strict=True))
-    np.testing.assert_allclose(both, jnp.sum(weight * forward), rtol=1e-12)
+    weight = rng.normal(size=forward.shape)
+    pulled = jax.vjp(values, table, cosine)[1](jnp.asarray(weight))
+    both = sum(np.sum(np.asarray(p) * t) for p, t in zip(pulled, tangents, strict=True))
+    np.testing.assert_allclose(both, np.sum(weight * forward), rtol=1e-12)
 
 
 def test_linear_in_the_table():
     grid, rng = uneven_grid(), np.random.default_rng(4)
-    a, b = jnp.asarray(rng.uniform(0, 3, (2, 1, 181)))
-    cosine = jnp.asarray(rng.uniform(-1, 1, 50))
-    p, q, both = (interpolated(t, grid, cosine) for t in (a, b, 2 * a - b))
+    a, b = rng.uniform(0, 3, (2, 1, 181))
+    cosine = rng.uniform(-1, 1, 50)
+    p, q, both = (np.asarray(interpolated(t, grid, cosine)) for t in (a, b, 2 * a - b))
     np.testing.assert_allclose(both, 2 * p - q, rtol=ROUNDING, atol=ROUNDING)
 
 
 def test_axes():
     grid, rng = degrees(5.0), np.random.default_rng(6)
-    shared = jnp.asarray(rng.uniform(1, 2, (3, 37)))
-    own = jnp.asarray(rng.uniform(1, 2, (4, 3, 37)))
-    cosine = jnp.asarray(rng.uniform(-1, 1, (4, 2)))
+    shared, own = rng.uniform(1, 2, (3, 37)), rng.uniform(1, 2, (4, 3, 37))
+    cosine = rng.uniform(-1, 1, (4, 2))
     by_view = interpolated(own, grid, cosine, multiple_views=True)
     assert by_view.shape == (4, 3, 2)
     for view in range(2):
@@ -230,7 +233,7 @@ def test_axes():
     for column in range(4):
         one = interpolated(own[column], grid, cosine[column, 0])
         np.testing.assert_allclose(one, by_view[column, :, 0], rtol=1e-15)
-    assert interpolate_phase_function(shared, grid, cosine).shape == (4, 2, 3)
+    assert jax.eval_shape(interpolation(tuple(grid)), shared, cosine).shape == (4, 2, 3)
     mapped = jax.jit(jax.vmap(lambda t, c: interpolate_phase_function(t, grid, c)))
     np.testing.assert_allclose(mapped(own, cosine[:, 0]), by_view[..., 0], rtol=1e-14)
 
@@ -302,18 +305,18 @@ def test_normalised_tables_have_mean_one():
 def test_mixture_of_phase_functions_and_moments():
     weights = jnp.asarray([[3.0, 1.0], [0.0, 2.0], [0.0, 0.0]])
     values = jnp.asarray([0.5, 2.5])
-    np.testing.assert_allclose(mix_phase_functions(weights, values), [1.0, 2.5, 0.0])
+    np.testing.assert_allclose(MIXED(weights, values), [1.0, 2.5, 0.0])
     by_view = jnp.asarray([[0.5, 1.0], [2.5, 3.0]])
-    mixed = mix_phase_functions(weights, by_view, multiple_views=True)
+    mixed = MIXED(weights, by_view, multiple_views=True)
     np.testing.assert_allclose(mixed, [[1.0, 1.5], [2.5, 3.0], [0.0, 0.0]])
     moments = jnp.asarray([[1.0, 0.8, 0.6], [1.0, 0.4, 0.2]])
     np.testing.assert_allclose(
         mix_moments(weights, moments), [[1, 0.7, 0.5], [1, 0.4, 0.2], [1, 0, 0]]
     )
     batch = jnp.asarray([[0.5, 2.5], [1.0, 4.0]])
-    np.testing.assert_allclose(mix_phase_functions(weights, batch)[1], [1.75, 4.0, 0.0])
+    np.testing.assert_allclose(MIXED(weights, batch)[1], [1.75, 4.0, 0.0])
     each = jax.vmap(mix_phase_functions, in_axes=(None, 0))(weights, batch)
-    np.testing.assert_allclose(each, mix_phase_functions(weights, batch))
+    np.testing.assert_allclose(each, MIXED(weights, batch))
 
 
 @pytest.mark.float32
