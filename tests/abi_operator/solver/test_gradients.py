@@ -134,6 +134,10 @@ def test_batched_gauss_newton_in_a_while_loop(jacobian):
     """Columns that need more steps than others keep the loop running for all."""
     residuals, args, truth, guess = retrieval()
 
+    def twice(x, args):
+        rest = residuals(x, args)
+        return rest, rest
+
     def solve(x, args):
         def unfinished(carry):
             x, step, count = carry
@@ -141,8 +145,8 @@ def test_batched_gauss_newton_in_a_while_loop(jacobian):
 
         def advance(carry):
             x, _, count = carry
-            slope = jacobian(residuals)(x, args)
-            step = -jnp.linalg.solve(slope.T @ slope, slope.T @ residuals(x, args))
+            slope, rest = jacobian(twice, has_aux=True)(x, args)
+            step = -jnp.linalg.solve(slope.T @ slope, slope.T @ rest)
             return x + jnp.clip(step, -0.5, 0.5), step, count + 1
 
         return jax.lax.while_loop(unfinished, advance, (x, jnp.ones_like(x), 0))

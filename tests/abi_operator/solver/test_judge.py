@@ -176,7 +176,7 @@ def test_the_judge_knows_a_grey_ground():
     "ground, scattering, num_streams",
     [
         (TILTED, "tms", 4),
-        (VEGETATION, None, 4),
+        pytest.param(VEGETATION, None, 4, marks=pytest.mark.slow),
         pytest.param(VEGETATION, "tms", 8, marks=pytest.mark.slow),
     ],
     ids=["tilted-TMS-4", "vegetation-4", "vegetation-TMS-8"],

@@ -19,8 +19,8 @@ ROUNDING = 1e-12
 SPLIT = 1e-10
 
 
-# Columns that make a chunk of the second width, of which a program is compiled anyway.
-MANY = 16
+# Columns that make a chunk of the first width, of which a program is compiled anyway.
+MANY = 8
 
 
 def brf(columns, **options):
@@ -56,7 +56,7 @@ def test_nothing_is_lost_between_white_ground_and_white_air(num_streams):
     """With ssa = 1 over albedo 1 the mean of the BRF over all views, weighted by mu, is 1."""
     nodes, weights = np.polynomial.legendre.leggauss(num_streams // 2)
     # The mean over so many azimuths is the mode of order 0.
-    azimuths = np.pi * np.arange(2 * num_streams) / num_streams
+    azimuths = 2 * np.pi * np.arange(num_streams) / num_streams
     mu, azimuth = (x.ravel() for x in np.meshgrid((nodes + 1) / 2, azimuths, indexing="ij"))
     tau = np.tile([0.1, 3.0, 65, 65, 70], (mu.size, 1))
     moments = np.broadcast_to(0.85 ** np.arange(65), (*tau.shape, 65))
@@ -102,9 +102,9 @@ def test_batch_order_subset_and_tiles_change_nothing(count):
 
 def test_leading_axes_broadcast():
     tau, ssa, moments, albedo, mu0, mu, azimuth = standard_columns()
-    albedos = np.array([0.0, 0.1, 0.5])[:, None]
+    albedos = np.array([0.5, 0.1])[:, None]
     grid = brf((tau, ssa, moments, albedos, mu0, mu, azimuth))
-    assert grid.shape == (3, 4)
+    assert grid.shape == (2, 4)
     one = brf((tau, ssa, moments, np.full(4, 0.1), mu0, mu, azimuth))
     np.testing.assert_allclose(grid[1], one, rtol=1e-13)
 
@@ -112,9 +112,9 @@ def test_leading_axes_broadcast():
 def test_doublings_chosen_from_the_data_equal_more_of_them(monkeypatch):
     """Each layer has more beside thick neighbours, and if it is thought to reach less far."""
     columns = standard_columns()
-    options = {"num_streams": 2, "num_doublings": None}
+    options = {"num_doublings": None, "single_scattering": None}
     chosen = brf(columns, **options)
-    traced = jax.jit(lambda *a: toa_brf(*a, num_streams=2))(*columns)
+    traced = jax.jit(lambda *a: toa_brf(*a, num_streams=4, single_scattering=None))(*columns)
     np.testing.assert_allclose(chosen, traced, rtol=1e-10)
     thick = [columns[0].copy(), *columns[1:]]
     thick[0][2:] = 1e4
@@ -138,7 +138,7 @@ def test_grazing_reflectances_below_zero_are_reported():
     padded = [np.pad(x, [(0, 4)] + [(0, 0)] * (x.ndim - 1)) for x in layer]
     azimuths = np.linspace(0, np.pi, MANY)
     columns = [np.tile(x, (MANY,) + (1,) * np.ndim(x)) for x in (*padded, 0.0, 0.05, 0.05)]
-    result = brf((*columns, azimuths), single_scattering=None)
+    result = brf((*columns, azimuths), num_doublings=None, single_scattering=None)
     assert result[0] < -0.5
     expected = [cdisort_brf(*layer, 0.0, 0.05, 0.05, azimuth, 4, False) for azimuth in azimuths]
     np.testing.assert_allclose(result, expected, rtol=1e-8)
@@ -180,7 +180,7 @@ def test_exact_phase_function_equals_a_long_enough_series():
 def test_few_modes_leave_the_exact_single_scattering_alone(num_streams, fewer):
     """A thin layer scatters once, so that one mode is as good as all; a thick one needs more."""
     tau, *rest = standard_columns()
-    rest[2] = np.zeros((MANY // 4, 1))  # black ground, and as many columns as others have
+    rest[2] = np.zeros(4)  # black ground
     thin, thick = (1e-9 * tau, *rest), (tau, *rest)
     options = {"num_streams": num_streams}
     np.testing.assert_allclose(brf(thin, num_modes=1, **options), brf(thin, **options), rtol=1e-6)
@@ -191,10 +191,10 @@ def test_few_modes_leave_the_exact_single_scattering_alone(num_streams, fewer):
 
 def test_the_first_mode_is_the_mean_over_azimuths():
     """Light scattered once, the same with all modes and with one, drops out of the difference."""
-    tau, ssa, moments, albedo, mu0, mu, _ = (np.repeat(x, 8, axis=0) for x in standard_columns(4))
-    azimuth = np.tile(np.pi * np.arange(8) / 4, 4)
+    tau, ssa, moments, albedo, mu0, mu, _ = (np.repeat(x, 4, axis=0) for x in standard_columns(2))
+    azimuth = np.tile(np.pi * np.arange(4) / 2, 2)
     columns = tau, ssa, moments, albedo, mu0, mu, azimuth
-    higher = (brf(columns) - brf(columns, num_modes=1)).reshape(4, 8)
+    higher = (brf(columns) - brf(columns, num_modes=1)).reshape(2, 4)
     assert np.all(np.ptp(higher, axis=1) > 1e-4)
     np.testing.assert_allclose(higher.mean(axis=1), 0, atol=1e-14)
 
