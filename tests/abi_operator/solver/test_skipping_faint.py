@@ -75,7 +75,7 @@ def test_nothing_is_solved(monkeypatch):
 
 def test_the_budget_is_kept():
     """Of the columns some are faint, of which no more is missing than half of what may be."""
-    given = columns(scattered=1e-3)
+    given = columns(scattered=1e-2)
     whole, found = (brf(given, x) for x in (None, BUDGET))
     wrong = np.abs(found - whole) / np.maximum(whole, 0.01)
     assert 1e-5 < np.quantile(wrong, 0.99) < 0.5 * BUDGET
@@ -128,7 +128,7 @@ def test_light_is_rounded_where_the_budget_has_room(monkeypatch):
     monkeypatch.setattr(emission, "_radiance", unsolved)
     # Budgets of their own, as above.
     rounded = light(given, BUDGET * (1 + 5e-9))
-    small = light(given, 0.5 * budget.SINGLE_FROM)
+    small = light(given, 0.5 * budget.SINGLE_FROM * (1 + 7e-9))
     monkeypatch.setattr(budget, "SINGLE_FROM", np.inf)
     exact = light(given, BUDGET * (1 + 6e-9))
     off = np.abs(rounded / exact - 1)
