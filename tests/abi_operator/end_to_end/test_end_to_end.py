@@ -32,7 +32,7 @@ from abi_operator.optics.mie_table import mie_table
 
 SEED = 20050828
 FEW, MANY = 4, 26  # columns of each kind
-STREAMS = 8
+FEW_STREAMS, STREAMS = 4, 8  # of few columns, and of many
 # Enough for any layer here.
 DOUBLINGS = 10
 FLOOR = 1e-3  # BRF below which differences are absolute
@@ -46,9 +46,18 @@ EMITTING = ("C05", "C06", "C07")
 
 
 @pytest.fixture(scope="module", params=[FEW, pytest.param(MANY, marks=pytest.mark.slow)])
-def columns(request):
+def many(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def streams(many):
+    return STREAMS if many == MANY else FEW_STREAMS
+
+
+@pytest.fixture(scope="module")
+def columns(many, request):
     """Of each kind the last, so that a sample of many columns is not that of few."""
-    many = request.param
     each = max(FEW, round(many * request.config.getoption("--scale")))
     every = independent_columns.specified_columns(many, SEED)
     return [c for k, c in enumerate(every) if k % many >= many - each]
@@ -60,8 +69,8 @@ def states(columns):
 
 
 @pytest.fixture(scope="module")
-def reflected(states):
-    return np.asarray(brf(states, BANDS, num_streams=STREAMS, num_doublings=DOUBLINGS))
+def reflected(states, streams):
+    return np.asarray(brf(states, BANDS, num_streams=streams, num_doublings=DOUBLINGS))
 
 
 def assert_equal(ours, reference, columns, bands, floor=FLOOR):
@@ -78,9 +87,9 @@ def assert_equal(ours, reference, columns, bands, floor=FLOOR):
     )
 
 
-def test_reflectances_of_seven_bands(columns, reflected):
+def test_reflectances_of_seven_bands(columns, reflected, streams):
     reference = [
-        [independent.cdisort_sum(c, b, independent.layers(c, b), STREAMS) for b in BANDS]
+        [independent.cdisort_sum(c, b, independent.layers(c, b), streams) for b in BANDS]
         for c in columns
     ]
     assert reflected.shape == (len(columns), len(BANDS)) and len(KINDS) * MANY >= 200
@@ -96,7 +105,7 @@ def sources(made, band, distance):
     return in_band(made["temperature"], band), ground, sunlight
 
 
-def test_radiances_with_emission_and_fires(columns):
+def test_radiances_with_emission_and_fires(columns, streams):
     """Sunlight and emission in one solve, in the bands in which fires shine.
 
     CDISORT is given the temperatures at which its Planck function is the in-band one. Every tenth
@@ -110,7 +119,7 @@ def test_radiances_with_emission_and_fires(columns):
     ]
     state = independent_columns.states(seen, "mitchell")
     ours = radiance(
-        state, EMITTING, sun_distance=distance, num_streams=STREAMS, num_doublings=DOUBLINGS
+        state, EMITTING, sun_distance=distance, num_streams=streams, num_doublings=DOUBLINGS
     )
     reference = [
         [
@@ -118,7 +127,7 @@ def test_radiances_with_emission_and_fires(columns):
                 c,
                 band,
                 independent.layers(c, band, liquid_optics="mitchell"),
-                STREAMS,
+                streams,
                 sources(c, band, distance[i]),
             )
             for band in EMITTING
@@ -131,7 +140,7 @@ def test_radiances_with_emission_and_fires(columns):
     assert_equal(np.asarray(ours), np.array(reference), columns, EMITTING, FLOOR * white)
 
 
-def test_plumes_of_spheres_straight_from_mie_theory(columns, reflected):
+def test_plumes_of_spheres_straight_from_mie_theory(columns, reflected, streams):
     """The tables of phase functions left out as well: amplitudes summed over spheres.
 
     The tables keep moments and log P in 16 bits and smooth what narrow resonances do to P.
@@ -140,7 +149,7 @@ def test_plumes_of_spheres_straight_from_mie_theory(columns, reflected):
 
     def mie_phase(species, node, band, cosine):
         moments, phase = plumes.phase_function(
-            species, mie_table(species).effective_radius_um[node], band, cosine, STREAMS + 1
+            species, mie_table(species).effective_radius_um[node], band, cosine, streams + 1
         )
         return np.pad(moments, (0, independent.NUM_MOMENTS - moments.size)), lambda _: phase
 
@@ -150,7 +159,7 @@ def test_plumes_of_spheres_straight_from_mie_theory(columns, reflected):
         cosine = cos_scattering(*independent.directions(made))
         for j, band in enumerate(BANDS):
             layers = independent.layers(made, band, mie_phase=partial(mie_phase, cosine=cosine))
-            reference = independent.cdisort_sum(made, band, layers, STREAMS)
+            reference = independent.cdisort_sum(made, band, layers, streams)
             error[row, j] = abs(reflected[i, j] - reference)
     print(
         "largest difference",
@@ -160,7 +169,7 @@ def test_plumes_of_spheres_straight_from_mie_theory(columns, reflected):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns", [FEW], indirect=True)
+@pytest.mark.parametrize("many", [FEW], indirect=True)
 def test_sixteen_streams(columns):
     """Two columns of each kind, in a band of air and plumes and one of vapour and ice."""
     few, bands = columns[:: FEW // 2], ("C01", "C05")
@@ -171,7 +180,7 @@ def test_sixteen_streams(columns):
     assert_equal(np.asarray(ours), np.array(reference), few, bands)
 
 
-def test_own_layers_through_cdisort(columns, states, reflected):
+def test_own_layers_through_cdisort(columns, states, reflected, streams):
     """Wiring: what the operator solves are the layers of `column_optics`, all terms of them."""
     rows, bands = np.arange(0, len(columns), 7), ("C02", "C04", "C07")
 
@@ -180,7 +189,7 @@ def test_own_layers_through_cdisort(columns, states, reflected):
     def optics(air, cosine):
         each = [column_optics(air, ABI_BANDS[band]) for band in bands]
         return [
-            (x.weight, x.tau, x.ssa, x.moments(STREAMS + 1), x.phase_function(cosine)) for x in each
+            (x.weight, x.tau, x.ssa, x.moments(streams + 1), x.phase_function(cosine)) for x in each
         ]
 
     cosine = [cos_scattering(*independent.directions(columns[i])) for i in rows]
@@ -189,7 +198,7 @@ def test_own_layers_through_cdisort(columns, states, reflected):
     reference = [
         [
             independent.cdisort_sum(
-                columns[i], band, independent.Layers(*(x[row] for x in own)), STREAMS
+                columns[i], band, independent.Layers(*(x[row] for x in own)), streams
             )
             for band, own in zip(bands, found, strict=True)
         ]

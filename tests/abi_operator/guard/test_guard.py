@@ -1,5 +1,6 @@
 """Files, tolerances, tables and commands of the guard, on two columns that are solved at once."""
 
+import importlib
 import inspect
 import json
 import sys
@@ -18,6 +19,8 @@ from abi_operator.cli import make_app
 from abi_operator.files import InputError
 from abi_operator.guard import evaluation
 
+PROGRAM = importlib.import_module("abi_operator.solver.program")
+ALL_MODES = importlib.import_module("abi_operator.solver.all_modes")
 SCENARIO = f"{Path(sys.modules['guarded'].__file__)}:two_columns"
 
 
@@ -49,10 +52,10 @@ def test_values_and_jacobians_are_those_of_the_operator(evaluated):
                 numbers, k = np.concatenate([np.ravel(x) for x in leaves]), 0
                 numbers[evaluated.inputs.index(name)] += sign * step
                 for i, leaf in enumerate(leaves):
-                    leaves[i] = jnp.asarray(numbers[k : k + leaf.size]).reshape(leaf.shape)
+                    leaves[i] = numbers[k : k + leaf.size].reshape(leaf.shape)
                     k += leaf.size
                 moved.append(jax.tree.unflatten(tree, leaves))
-    batch = jax.tree.map(lambda *x: jnp.stack(x), *moved)
+    batch = jax.tree.map(lambda *x: np.stack(x), *moved)
     value, *ends = np.asarray(brf(batch, BANDS, **SETTINGS)).reshape(-1, 2)
     np.testing.assert_allclose(evaluated.value[:, 0], value, rtol=1e-12)
     for k, (name, step) in enumerate(steps.items()):
@@ -70,6 +73,18 @@ def test_doublings_are_enough(evaluated):
     """The number that the guard takes, against the one for any layer at all."""
     many = guard.evaluate(two_columns(), BANDS, num_doublings=14, **SETTINGS)
     assert guard.excess(evaluated, many) < 1e-3
+
+
+def test_a_scaled_solver(evaluated, monkeypatch):
+    """All light 1.001 times too bright."""
+    once, more = PROGRAM.seen_at_once, ALL_MODES.mode_sum
+    monkeypatch.setattr(PROGRAM, "seen_at_once", lambda *x: 1.001 * once(*x))
+    monkeypatch.setattr(ALL_MODES, "mode_sum", lambda *x: 1.001 * more(*x))
+    # A number of doublings of its own, more than enough, so that no other test gets this program.
+    now = guard.evaluate(two_columns(), BANDS, num_doublings=11, **SETTINGS)
+    caught = guard.compare(evaluated, now).moved
+    assert {entry.column for entry in caught} == {"dark", "bright"}
+    assert {entry.entry for entry in caught} >= {"", "albedo.C02", "geometry.view_zenith"}
 
 
 def test_a_batch_is_its_columns(evaluated):

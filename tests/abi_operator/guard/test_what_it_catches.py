@@ -12,7 +12,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from guarded import BANDS, SETTINGS, two_columns
 
 from abi_operator import Hydrometeor, guard, standard_atmospheres
 from abi_operator.optical_properties import OpticalProperties, Scatterer
@@ -20,8 +19,6 @@ from abi_operator.optics import CLASSES, mie_species
 
 COLUMN = importlib.import_module("abi_operator.optics.column")
 BAND_COLUMNS = importlib.import_module("abi_operator.band_columns")
-PROGRAM = importlib.import_module("abi_operator.solver.program")
-ALL_MODES = importlib.import_module("abi_operator.solver.all_modes")
 OCEAN = importlib.import_module("abi_operator.surface.ocean")
 
 SEEN = ("C02",)
@@ -187,19 +184,6 @@ def test_columns_that_catch(evaluations, fault):
     assert caught == CATCHES[fault] | BY_DERIVATIVE.get(fault, set()), rows
 
 
-def test_a_scaled_solver(monkeypatch):
-    """All light 1.001 times too bright, in the two columns that are solved at once."""
-    stored = guard.evaluate(two_columns(), BANDS, **SETTINGS)
-    once, more = PROGRAM.seen_at_once, ALL_MODES.mode_sum
-    monkeypatch.setattr(PROGRAM, "seen_at_once", lambda *x: 1.001 * once(*x))
-    monkeypatch.setattr(ALL_MODES, "mode_sum", lambda *x: 1.001 * more(*x))
-    # A number of doublings of its own, more than enough, so that no other test gets this program.
-    now = guard.evaluate(two_columns(), BANDS, num_doublings=11, **SETTINGS)
-    caught = guard.compare(stored, now).moved
-    assert {entry.column for entry in caught} == {"dark", "bright"}
-    assert {entry.entry for entry in caught} >= {"", "albedo.C02", "geometry.view_zenith"}
-
-
 def test_a_changed_default_of_a_builder(monkeypatch):
     """Of the standard atmospheres: every column has another state, which needs no solving."""
     builder = standard_atmospheres.standard_atmosphere
@@ -238,7 +222,7 @@ def test_graupel_of_another_asymmetry(monkeypatch):
     column = {FROZEN: guard.standard_columns()[FROZEN]}
     stored = guard.evaluate(column, ("C01",))
     monkeypatch.setitem(CLASSES, "graupel", CLASSES["graupel"]._replace(asymmetry=0.801))
-    # As above: doublings of its own, so that the program is another.
+    # Doublings of its own, so that the program is another.
     now = guard.evaluate(column, ("C01",), num_doublings=11)
     caught = guard.compare(stored, now).moved
     assert "" in {entry.entry for entry in caught}

@@ -1,6 +1,7 @@
 """The whole instrument: its order, and at which temperature a fire saturates it."""
 
 from dataclasses import replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -82,7 +83,7 @@ def test_air_sun_and_emissivity_move_the_limits_of_a_fire():
     columns = [
         State(a, dict.fromkeys(bands, jnp.asarray(x)), g, jnp.asarray(GROUND)) for a, g, x in cases
     ]
-    states = jax.tree.map(lambda *x: jnp.stack(x), *columns)
+    states = jax.tree.map(lambda *x: jnp.asarray(np.stack(x)), *columns)
 
     @jax.jit
     def pixel(temperature):
@@ -97,6 +98,13 @@ def test_air_sun_and_emissivity_move_the_limits_of_a_fire():
         jax.vmap(lambda x, band: observe(x, jnp.array([1.0, 24.0]), band).saturated, (0, None)),
         static_argnums=1,
     )
+
+    @partial(jax.jit, static_argnums=1)
+    def through(atmosphere, band):
+        """Share of radiance that comes through the air on its way to the satellite."""
+        absorbing = gas_absorption(atmosphere, BANDS[band]) + rayleigh(atmosphere, BANDS[band])
+        return transmittance(absorbing, 1 / day.mu)
+
     limits = {}
     for k, band in enumerate(bands):
         low, high = np.full(4, 400.0), np.full(4, 1500.0)
@@ -105,8 +113,7 @@ def test_air_sun_and_emissivity_move_the_limits_of_a_fire():
             full = saturated(pixel(jnp.asarray(middle))[:, :, k], band)
             low, high = np.where(full, low, middle), np.where(full, middle, high)
         limits[band] = high
-        absorbing = [gas_absorption(a, BANDS[band]) + rayleigh(a, BANDS[band]) for a, *_ in cases]
-        clear = np.array([transmittance(x, 1 / day.mu) for x in absorbing])
+        clear = np.array([through(a, band) for a, *_ in cases])
         emissivity = np.array([1 - albedo for *_, albedo in cases])
         room = 25 * (range_ceiling(band) - pixel(jnp.asarray(high))[:, 1, k])
         needed = in_band_radiance(jnp.asarray(GROUND), band) + room / (clear * emissivity)

@@ -44,7 +44,7 @@ def test_contrast_in_c06_depends_on_the_albedo_of_the_background():
     columns = [
         state(x, a, jnp.asarray(p)) for x in (nothing, air) for p in (part, 0.0) for a in albedo
     ]
-    batch = jax.tree.map(lambda *x: jnp.stack(x), *columns)
+    batch = jax.tree.map(lambda *x: np.stack(x), *columns)
     seen = radiance(batch, ("C06",), num_streams=2, num_modes=1, num_doublings=0).reshape(
         2, 2, albedo.size
     )

@@ -10,6 +10,10 @@ import pytest
 from abi_operator.surface import LandAndSea, brightened, directional_albedo
 
 DIRECTIONS = [jnp.array(x) for x in ([0.9, 0.5], [0.6, 0.7], [0.3, 2.5])]
+BRDF = jax.jit(lambda ground: ground.brdf(*DIRECTIONS))
+MODES = jax.jit(lambda ground: ground.modes(1, *DIRECTIONS[:2]))
+WHITE_SKY_ALBEDO = jax.jit(lambda ground: ground.white_sky_albedo())
+ALBEDO = jax.jit(directional_albedo)
 
 
 @pytest.fixture
@@ -18,20 +22,16 @@ def coast(make_ground):
 
 
 def test_it_is_the_mean_of_its_parts_by_area(coast):
-    for ask in (
-        lambda ground: ground.brdf(*DIRECTIONS),
-        lambda ground: ground.modes(1, *DIRECTIONS[:2]),
-        lambda ground: ground.white_sky_albedo(),
-    ):
+    for ask in (BRDF, MODES, WHITE_SKY_ALBEDO):
         mean = 0.7 * ask(coast.land) + 0.3 * ask(coast.sea)
         np.testing.assert_allclose(ask(coast), mean, rtol=1e-12)
     inland = replace(coast, water_share=jnp.array(0.0))
-    np.testing.assert_array_equal(inland.brdf(*DIRECTIONS), coast.land.brdf(*DIRECTIONS))
+    np.testing.assert_array_equal(BRDF(inland), BRDF(coast.land))
 
 
 def test_slope_in_the_share_is_the_contrast(coast):
-    slope = jax.jacfwd(lambda w: replace(coast, water_share=w).brdf(*DIRECTIONS))(jnp.array(0.3))
-    contrast = coast.sea.brdf(*DIRECTIONS) - coast.land.brdf(*DIRECTIONS)
+    slope = jax.jacfwd(lambda w: BRDF(replace(coast, water_share=w)))(jnp.array(0.3))
+    contrast = BRDF(coast.sea) - BRDF(coast.land)
     np.testing.assert_allclose(slope, contrast, rtol=1e-12)
 
 
@@ -39,10 +39,10 @@ def test_slope_in_the_share_is_the_contrast(coast):
 def test_a_brightened_ground_reflects_more_to_all_sides(kind, coast, make_ground):
     ground = coast if kind == "land_and_sea" else make_ground(kind)
     brighter = brightened(ground, jnp.array(0.05))
-    more = brighter.brdf(*DIRECTIONS) - ground.brdf(*DIRECTIONS)
+    more = BRDF(brighter) - BRDF(ground)
     np.testing.assert_allclose(more, 0.05, rtol=1e-10)
     mu0 = jnp.array(0.7)
-    albedo = directional_albedo(brighter, mu0) - directional_albedo(ground, mu0)
+    albedo = ALBEDO(brighter, mu0) - ALBEDO(ground, mu0)
     assert float(albedo) == pytest.approx(0.05, rel=1e-10)
 
 
