@@ -7,6 +7,7 @@ them; with all factors 0 the program is the one that is guarded, which the first
 """
 
 import importlib
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -31,8 +32,9 @@ SIZES = dict.fromkeys(SCALED, 1e-3) | {"ground": 1e-3, "default of snow": 0.1}
 SIZES |= {"sign of a derivative": 2.0, "float32": 1.0}
 
 # Those of one structure, with all the producers in it.
-EVERY = {name for name, state in guard.standard_columns().items() if state.fire is not None}
-ROUGH = set(guard.standard_columns()) - EVERY
+STANDARD = guard.standard_columns()
+EVERY = {name for name, state in STANDARD.items() if state.fire is not None}
+ROUGH = set(STANDARD) - EVERY
 FROZEN = "other hydrometeors over sea and land"
 # By day: in C02 there is nothing to see of the sun's light by night.
 DAY = EVERY - {"fire by night"}
@@ -119,13 +121,14 @@ def producers():
 def carrying(state, fault=None):
     """The state with the factors of one fault, or none, in a class of its own."""
     numbers = [SIZES[name] if name == fault else 0.0 for name in (*SCALED, *OTHERS)]
-    num_layers = state.atmosphere.height.shape[0] - 1
+    air = state.atmosphere
+    num_layers = air.height.shape[0] - 1
     numbers = np.pad(numbers, (0, 2 * num_layers - len(numbers)))
     # Where there is mass there must be a number, so numbers begin at 1.
-    state.atmosphere.hydrometeors[FACTORS] = Hydrometeor(
-        jnp.asarray(numbers[:num_layers]), jnp.asarray(1 + numbers[num_layers:])
+    carrier = Hydrometeor(jnp.asarray(numbers[:num_layers]), jnp.asarray(1 + numbers[num_layers:]))
+    return replace(
+        state, atmosphere=replace(air, hydrometeors=air.hydrometeors | {FACTORS: carrier})
     )
-    return state
 
 
 @pytest.fixture(scope="module")
@@ -141,18 +144,17 @@ def evaluations():
         for name, function in producers().items():
             patch.setattr(COLUMN, name, function)
         patch.setattr(BAND_COLUMNS, "ground_of", faulty_ground)
+        states = {x: state for x, state in STANDARD.items() if x in EVERY}
         columns = {
             f"{name}/{fault}": carrying(state, fault)
             for fault in (None, *CATCHES)
-            for name, state in guard.standard_columns().items()
-            if name in EVERY
+            for name, state in states.items()
         }
         # The class of factors makes these states a structure that no other test compiles.
         every = guard.evaluate(columns, SEEN)
     inputs = [name for name in every.inputs if FACTORS not in name]
-    found = {}
+    found, names = {}, tuple(states)
     for fault in (None, *CATCHES):
-        names = tuple(name for name in guard.standard_columns() if name in EVERY)
         part = guard.select(every, [f"{name}/{fault}" for name in names], SEEN, inputs)
         found[fault] = part._replace(columns=names)
     return found
@@ -187,7 +189,7 @@ def test_columns_that_catch(evaluations, fault):
 def test_a_changed_default_of_a_builder(monkeypatch):
     """Of the standard atmospheres: every column has another state, which needs no solving."""
     builder = standard_atmospheres.standard_atmosphere
-    before = guard.standard_columns()
+    before = STANDARD
     monkeypatch.setitem(builder.__kwdefaults__, "carbon_dioxide", 420e-6)
     after = guard.standard_columns()
     for name in EVERY:
@@ -197,7 +199,7 @@ def test_a_changed_default_of_a_builder(monkeypatch):
 
 def test_a_changed_foam(monkeypatch):
     """Of a band of the sea: its columns have another state, which needs no solving."""
-    before = guard.standard_columns()
+    before = STANDARD
     monkeypatch.setitem(OCEAN.FOAM_REFLECTANCE, "C01", 0.221)
     after = guard.standard_columns()
     for name in ROUGH:
@@ -207,7 +209,7 @@ def test_a_changed_foam(monkeypatch):
 
 def test_other_classes_and_mie_plumes_are_seen():
     """The columns on rough ground have every class and plume that the others have not."""
-    columns = guard.standard_columns()
+    columns = STANDARD
     classes = {name for x in columns.values() for name in x.atmosphere.hydrometeors}
     assert classes == set(CLASSES) - {"cloud"}
     plumes = columns["Mie smoke and ash over sea and land"].atmosphere.plumes

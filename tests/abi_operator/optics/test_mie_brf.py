@@ -176,7 +176,7 @@ def assert_near(ours, theirs):
 
 
 def test_brf_of_tables_and_of_miepython():
-    brf = reflectances(("ours", "reference"), 4)
+    brf = reflectances(("ours", "reference"), 8)
     assert_near(brf["ours"], brf["reference"])
 
 

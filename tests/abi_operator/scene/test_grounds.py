@@ -40,6 +40,12 @@ def coast(make_model):
 
 
 @pytest.fixture
+def thawed(coast):
+    """Without ice no column has a ground of two parts, for which there is a program of its own."""
+    return coast.assign(sea_ice=0 * coast["sea_ice"])
+
+
+@pytest.fixture
 def make_scenario(coast, kernels):
     def make(model=coast, albedo=kernels, **options):
         options = {"ocean_wind": "model", "sea_ice_albedo": 0.6, "gases": (), **options}
@@ -114,10 +120,10 @@ def test_columns_are_solved_by_their_kind(make_scenario, coast, kernels):
     np.testing.assert_allclose(found.T, direct, rtol=1e-10)
 
 
-def test_land_is_brighter_with_the_sun_behind_the_satellite(make_scenario, kernels):
+def test_land_is_brighter_with_the_sun_behind_the_satellite(make_scenario, thawed, kernels):
     """And, with the sun on the other side, the sea glints."""
-    made = make_scenario()
-    flat = make_scenario(albedo=kernels.drop_vars(list(KERNELS)))
+    made = make_scenario(thawed)
+    flat = make_scenario(thawed, kernels.drop_vars(list(KERNELS))).isel(x=slice(1, 2))  # land
 
     def seen(dataset, azimuth):
         dataset = dataset.assign(
@@ -127,12 +133,12 @@ def test_land_is_brighter_with_the_sun_behind_the_satellite(make_scenario, kerne
         )
         return simulate(dataset, **OPTIONS)["brf"].sel(band="C03").values
 
-    assert (seen(made, 0.0)[:, 1] > 1.05 * seen(flat, 0.0)[:, 1]).all()
-    assert (seen(made, 180.0)[[0, 2], 0] > 3 * seen(made, 0.0)[[0, 2], 0]).all()
+    assert (seen(made, 0.0)[:, 1] > 1.05 * seen(flat, 0.0)[:, 0]).all()
+    assert (seen(made, 180.0)[:, 0] > 3 * seen(made, 0.0)[:, 0]).all()
 
 
-def test_kernels_that_are_no_ground_are_flagged(make_scenario):
-    made = make_scenario()
+def test_kernels_that_are_no_ground_are_flagged(make_scenario, thawed):
+    made = make_scenario(thawed)
     made["volume_kernel_weight"].values[:, 0, 1] = -60.0
     flags = simulate(made, **OPTIONS)["quality_flag"].values
     bad = QUALITY_FLAGS["ground_below_zero"] | QUALITY_FLAGS["ground_above_one"]
