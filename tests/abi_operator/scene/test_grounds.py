@@ -109,8 +109,8 @@ def test_columns_are_solved_by_their_kind(make_scenario, coast, kernels):
     albedo = kernels.copy(deep=True)
     for name in KERNELS:
         albedo[name].loc[{"lat": 33.2}] = 0.0  # one column of land without kernels
-    alike = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
-    made = make_scenario(xr.concat([coast, coast], "y", **alike), albedo)
+    twice = xr.concat([coast, coast], "y", data_vars="minimal", coords="minimal", compat="override")
+    made = make_scenario(twice, albedo)
     states = column_states(made, SOLVED, num_streams=2)
     kinds = {type(some.albedo["C03"]): chosen for chosen, some in by_kind(states)}
     assert set(kinds) == {np.ndarray, RossLi, Ocean, LandAndSea}
