@@ -116,6 +116,7 @@ def test_flagged_pixels_are_not_solved(made):
     flagged["solar_zenith_angle"][0, 0] = 95.0
     # Beside them those without a flag: one column alone would be solved by a program of its own.
     both = xr.concat([flagged, made], "x", data_vars="minimal", coords="minimal", compat="override")
+    assert isinstance(both, xr.Dataset)
     both = simulate(both, **OPTIONS)
     result, beside = (both.isel(x=x) for x in (slice(0, 2), slice(2, 4)))
     np.testing.assert_allclose(beside["brf"], full["brf"], rtol=ROUNDING)
