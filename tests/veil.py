@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 
-from retrievals import Quantity, StateVector, Unbounded, measurement
+from retrievals import Minimiser, Quantity, StateVector, Unbounded, measurement
 from retrievals.declarations import aod_550, plume
 from retrievals.kinds import BANDS
 from retrievals.quantities import replaced
@@ -35,6 +35,9 @@ VEIL = Veil()
 _BRIGHTER = Quantity("brighter", "1", "ground", "", Unbounded(), replaced, sigma=0.05, mean=0.0)
 TWO = Veil(StateVector((aod_550("smoke"), _BRIGHTER)))
 """The same with the ground's brightness unknown, too."""
+
+TIGHT = Minimiser(1e-8, 200, starts="prior")
+"""Steps that end at the minimum; the same for all, so that one program serves them."""
 
 
 def veiled_pixels():

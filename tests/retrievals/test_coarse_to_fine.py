@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, replace
 
+import jax
 import numpy as np
 import pytest
-from veil import TWO, Veil, veiled_pixels
+from veil import TIGHT, TWO, Veil, veiled_pixels
 
 from retrievals import ForwardModel, Minimiser, Prior, retrieve_pixels
 from retrievals.coarse_to_fine import COARSE_STREAMS, coarse, minimise_from_coarse
@@ -16,14 +17,26 @@ from retrievals.kinds import BANDS
 RIGHT = 0.05
 
 
-@dataclass(frozen=True)
-class Rough(Veil):
-    """The veil with reflectances that are off by some per cent, or no numbers at all."""
+# By how much the reflectances of the rough model are off: it is too dark, or no number at all.
+OFF = -0.1, np.nan
 
-    off: float = 0.0
+
+@dataclass(frozen=True)
+class OfPair(Veil):
+    """The veil of a ground that comes with a number for another forward model."""
 
     def __call__(self, x, state):
-        return super().__call__(x, state) * (1 + self.off)
+        ground, _ = state
+        return super().__call__(x, ground)
+
+
+@dataclass(frozen=True)
+class Rough(Veil):
+    """The veil with reflectances that are off by that share, or no numbers at all."""
+
+    def __call__(self, x, state):
+        ground, off = state
+        return super().__call__(x, ground) * (1 + off)
 
 
 @pytest.fixture(scope="module")
@@ -31,20 +44,32 @@ def pixels():
     """Measurements, states, prior, and the minima by tight steps of the whole forward model."""
     observation, ground, _ = veiled_pixels()
     prior = Prior(np.asarray(TWO.vector.x(0.4, 0.0)), np.diag([1.0, 0.02**2]))
-    tight = Minimiser(1e-8, 200, starts="prior")
-    found = retrieve_pixels(TWO, observation, ground, prior=prior, minimiser=tight)
+    found = retrieve_pixels(TWO, observation, ground, prior=prior, minimiser=TIGHT)
     assert found.inversion.converged.all()
     return observation, ground, prior, found.inversion
 
 
-@pytest.mark.parametrize("off", [-0.1, np.nan])
-def test_however_rough_the_first_steps_are_the_minimum_is_the_same(pixels, off):
-    observation, ground, prior, tight = pixels
+@pytest.fixture(scope="module")
+def from_rough(pixels):
+    """Minima of all pixels after first steps that are off by each of `OFF`."""
+    observation, ground, prior, _ = pixels
     _, usable, own = checked(TWO, observation, prior)
-    rough = Rough(TWO.vector, off=off)
-    found = minimise_from_coarse(
-        rough, TWO, Minimiser().chosen(True), (own, usable, ground), own.x_prior
+    count = len(ground)
+    own, usable, ground = jax.tree.map(
+        lambda x: np.concatenate([x] * len(OFF)), (own, usable, ground)
     )
+    states = ground, np.repeat(OFF, count)[:, None]
+    whole, rough = OfPair(TWO.vector), Rough(TWO.vector)
+    found = minimise_from_coarse(
+        rough, whole, Minimiser().chosen(True), (own, usable, states), own.x_prior
+    )
+    return jax.tree.map(lambda x: x.reshape(len(OFF), count, *x.shape[1:]), found)
+
+
+@pytest.mark.parametrize("number", range(len(OFF)))
+def test_however_rough_the_first_steps_are_the_minimum_is_the_same(pixels, from_rough, number):
+    tight = pixels[-1]
+    found = jax.tree.map(lambda x: x[number], from_rough)
     assert found.converged.all()
     sigma = np.sqrt(np.diagonal(tight.covariance, axis1=1, axis2=2))
     assert np.abs((found.x - tight.x) / sigma).max() < RIGHT
