@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -40,11 +41,18 @@ FLOORS = [
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 
 
+@cache
+def nodes(path: Path) -> list[ast.AST]:
+    """All that a file's syntax tree is made of."""
+    return list(ast.walk(ast.parse(path.read_text())))
+
+
+@cache
 def imported(path: Path, package: str) -> list[str]:
     """Modules of `package` that a file imports, as dotted names below the package."""
     names = []
     inside = list(path.relative_to(ROOT / package).parent.parts)
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = inside[: len(inside) - node.level + 1] + (node.module or "").split(".")
             tails = [a.name for a in node.names] if not node.module else [""]
@@ -54,6 +62,7 @@ def imported(path: Path, package: str) -> list[str]:
     return names
 
 
+@cache
 def sources(package: str) -> list[Path]:
     return sorted((ROOT / package).rglob("*.py"))
 
@@ -117,10 +126,9 @@ def test_the_compiler_is_spoken_of_in_the_machine_alone():
 
 
 def absolute(path: Path) -> list[str]:
-    tree = ast.parse(path.read_text())
-    plain = [a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names]
+    plain = [a.name for n in nodes(path) if isinstance(n, ast.Import) for a in n.names]
     return plain + [
-        n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and not n.level
+        n.module or "" for n in nodes(path) if isinstance(n, ast.ImportFrom) and not n.level
     ]
 
 
@@ -135,7 +143,7 @@ def test_imports_stand_at_the_head_of_files():
     for path in [*sources("abi_operator"), *sources("retrievals")]:
         if "plugin" in path.parts:  # which pytest loads before JAX may be
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes(path):
             if isinstance(node, ast.FunctionDef):
                 inner = [x for x in ast.walk(node) if isinstance(x, ast.Import | ast.ImportFrom)]
                 assert not inner, f"{path}: {node.name} imports inside"
@@ -146,7 +154,7 @@ LONGEST = 80  # lines of a function, of the solver with its signature and docstr
 
 def test_functions_of_the_solver_are_short():
     for path in [*sources("abi_operator/solver"), *sources("abi_operator/machine")]:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes(path):
             if isinstance(node, ast.FunctionDef):
                 assert node.end_lineno - node.lineno < LONGEST, (path, node.name)
 
@@ -154,7 +162,7 @@ def test_functions_of_the_solver_are_short():
 def test_functions_are_short():
     for package in ("abi_operator", "retrievals"):
         for path in sources(package):
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in nodes(path):
                 if isinstance(node, ast.FunctionDef):
                     own = node.body[1 if ast.get_docstring(node) and node.body[1:] else 0 :]
                     assert node.end_lineno - own[0].lineno < LONGEST, (path, node.name)

@@ -16,7 +16,7 @@ SUNLIT = (2, 4, 1, False, 204, 1.0)
 EMITTING = (2, 4, 1, True, 102, 1.0)
 SAMPLED = [
     (SUNLIT, "float64"),
-    (SUNLIT, "float32"),
+    pytest.param(SUNLIT, "float32", marks=pytest.mark.slow),
     pytest.param(EMITTING, "float64", marks=pytest.mark.slow),
 ]
 
