@@ -1,7 +1,9 @@
 """A forward model of retrievals that costs nothing, and pixels of it."""
 
 from dataclasses import dataclass
+from functools import partial
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -40,8 +42,20 @@ TIGHT = Minimiser(1e-8, 200, starts="prior")
 """Steps that end at the minimum; the same for all, so that one program serves them."""
 
 
+@partial(jax.jit, static_argnums=0)
+def seen(forward, x, ground):
+    """What a veil shows at x: one program, and not one for every operation."""
+    return forward(x, ground)
+
+
+@partial(jax.jit, static_argnums=0)
+def slopes(forward, x, ground):
+    """Derivatives of that in one x (band, x)."""
+    return jax.jacfwd(lambda x: forward(x, ground))(x)
+
+
 def veiled_pixels():
     """Observations, states and true optical depths of pixels under a veil."""
     ground, truth = np.linspace(0.02, 0.2, 12)[:, None] * np.ones(3), np.geomspace(0.05, 2, 12)
-    seen = np.asarray(VEIL(VEIL.vector.x(truth), jnp.asarray(ground)))
-    return measurement(seen, BANDS), ground, truth
+    measured = np.asarray(seen(VEIL, VEIL.vector.x(truth), ground))
+    return measurement(measured, BANDS), ground, truth

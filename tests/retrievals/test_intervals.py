@@ -1,10 +1,9 @@
 """Intervals of the posterior against its integral on a fine grid."""
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from veil import TIGHT, TWO, veiled_pixels
+from veil import TIGHT, TWO, seen, veiled_pixels
 
 from retrievals import Observation, Prior
 from retrievals.intervals import LEVELS, NUM_POINTS, posterior_intervals
@@ -31,9 +30,7 @@ def on_a_grid(observation, ground, x, sigma):
     """Quantiles (level, x) of the posterior of one pixel, by the sum over a grid."""
     first, second = (x[i] + sigma[i] * np.linspace(-7, 7, 561) for i in (0, 1))
     grid = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
-    departure = (np.asarray(TWO(jnp.asarray(grid), ground)) - observation.measured) / (
-        observation.sigma
-    )
+    departure = (np.asarray(seen(TWO, grid, ground)) - observation.measured) / observation.sigma
     apart = (grid - PRIOR.x_prior) / np.sqrt(np.diag(PRIOR.S_prior))
     weight = np.exp(-((departure**2).sum(-1) + (apart**2).sum(-1)) / 2)
     bounds = []
@@ -48,8 +45,8 @@ def exact(noisy):
     """The same of all pixels (pixel, level, x)."""
     observation, ground, x, found = noisy
     sigma = np.sqrt(np.diagonal(found.posterior_covariance, axis1=1, axis2=2))
-    seen = map(Observation, observation.measured, observation.sigma)
-    return np.stack([on_a_grid(*of) for of in zip(seen, ground, x, sigma, strict=True)])
+    each = map(Observation, observation.measured, observation.sigma)
+    return np.stack([on_a_grid(*of) for of in zip(each, ground, x, sigma, strict=True)])
 
 
 @pytest.mark.parametrize("sampled", [False, True])

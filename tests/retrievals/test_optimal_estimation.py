@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from veil import TWO, VEIL, veiled_pixels
+from veil import TWO, VEIL, seen, slopes, veiled_pixels
 
 from retrievals import Bounded, Observation, Prior, Quantity, StateVector
 from retrievals.optimal_estimation import estimates
@@ -47,7 +47,7 @@ def test_diagnostics_are_their_formulas(diagnosed, index):
     found, observation, ground, x, prior = diagnosed
     one = jax.tree.map(lambda leaf: leaf[index], found)
     counts = np.isfinite(observation.sigma[index])
-    K = np.asarray(jax.jacfwd(lambda x: TWO(x, ground[index]))(jnp.asarray(x[index])))[counts]
+    K = np.asarray(slopes(TWO, x[index], ground[index]))[counts]
     sigma = observation.sigma[index][counts]
     S_obs = np.outer(sigma, sigma) * observation.correlation[index][np.ix_(counts, counts)]
     S_prior = prior.S_prior
@@ -70,11 +70,13 @@ def test_diagnostics_are_their_formulas(diagnosed, index):
     np.testing.assert_allclose(
         one.noise_covariance + one.smoothing_covariance, one.posterior_covariance, rtol=EXACT
     )
-    departure = (TWO(jnp.asarray(x[index]), ground[index]) - observation.measured[index])[counts]
+    departure = (np.asarray(seen(TWO, x[index], ground[index])) - observation.measured[index])[
+        counts
+    ]
     chi_square = departure @ np.linalg.inv(S_obs) @ departure
     np.testing.assert_allclose(one.chi_square, chi_square, rtol=EXACT)
     # dF / d ground is the transmittance; the transform's slope at 0 is 1 / 2
-    lit, dark = (np.asarray(TWO(jnp.asarray(x[index]), ground[index] + a)) for a in (1, 0))
+    lit, dark = (np.asarray(seen(TWO, x[index], ground[index] + a)) for a in (1, 0))
     transmittance = lit - dark
     error = np.abs(G @ transmittance[counts] * 0.5) * 0.02
     np.testing.assert_allclose(one.parameter_error[0], error, rtol=1e-9)
@@ -83,9 +85,9 @@ def test_diagnostics_are_their_formulas(diagnosed, index):
 def test_the_linearity_test_sees_curvature(diagnosed):
     found, observation, ground, x, _ = diagnosed
     variances, axes = np.linalg.eigh(found.posterior_covariance[0])
-    here, departures = np.asarray(TWO(jnp.asarray(x[0]), ground[0])), []
+    here, departures = np.asarray(seen(TWO, x[0], ground[0])), []
     for step in [*(axes * np.sqrt(variances)).T, *-(axes * np.sqrt(variances)).T]:
-        moved = np.asarray(TWO(jnp.asarray(x[0] + step), ground[0]))
+        moved = np.asarray(seen(TWO, x[0] + step, ground[0]))
         linear = here + found.jacobian[0] @ step
         departure = (moved - linear) / observation.sigma[0]
         departures.append(departure @ np.linalg.solve(observation.correlation[0], departure))

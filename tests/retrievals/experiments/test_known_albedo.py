@@ -6,9 +6,8 @@ import pytest
 from retrievals.experiments import known_albedo, scenes
 from retrievals.experiments.known_albedo import RELATIVE_ERROR
 
-
-# As many as the scene of the other retrievals has, whose programs serve here as well; what is tested
-# holds for any number.
+# As many as the scene of the other retrievals has, whose programs serve here as well; what is
+# tested holds for any number.
 NUM_LAYERS = 7
 
 
