@@ -66,9 +66,9 @@ def scenario():
 
 @pytest.fixture(scope="module")
 def burning():
-    """Its result, in whose radiance fires burn of which it says nothing."""
+    """It with the operator's radiance, in which fires burn of which it says nothing."""
     made = scenario()
-    # C07 alone: in the others nothing shines but fires.
+    # C07 alone, in which ground and air shine.
     result = simulate(made, bands=("C07",), num_streams=2, error_budget=None)
     states = with_fire(column_states(made, BANDS), 0.0)
     fraction, temperature = np.zeros(SHAPE), np.full(SHAPE, 700.0)
