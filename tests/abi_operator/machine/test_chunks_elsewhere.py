@@ -1,5 +1,7 @@
 """Chunks on another device than a CPU: the same way, taken by this CPU."""
 
+from functools import cache
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -29,19 +31,38 @@ def arguments(size):
     return tau, ssa, moments, 0.1, rng.uniform(0.2, 1, size), 0.6, rng.uniform(0, 3, size)
 
 
+MOST = 150
+EVERY = arguments(MOST)
+
+
 def total(*columns):
     brf = toa_brf(*columns, **OPTIONS)
-    return jnp.sum(brf * jnp.arange(brf.shape[0], dtype=brf.dtype)), brf
+    return jnp.sum(brf * np.arange(brf.shape[0], dtype=brf.dtype)), brf
 
 
-@pytest.mark.parametrize("size", [3, 64, 150])
+values_and_slopes = jax.value_and_grad(total, argnums=PLACES, has_aux=True)
+
+
+@cache
+def of_a_cpu():
+    """Brf of every column, and slopes of the sum, also in what all columns share by itself."""
+    each = [np.broadcast_to(x, (MOST, *np.shape(x)[1:])) for x in EVERY]
+    (_, brf), slopes = values_and_slopes(*each)
+    return np.asarray(brf), [np.asarray(x) for x in slopes]
+
+
+@pytest.mark.parametrize("size", [3, 64, MOST])
 @pytest.mark.parametrize("given", [np.asarray, jnp.asarray])
 def test_values_and_slopes_are_those_of_a_cpu(size, given, request):
-    columns = [given(x) for x in arguments(size)]
-    of = jax.value_and_grad(total, argnums=PLACES, has_aux=True)
-    expected = of(*columns)
+    columns = [given(x if np.ndim(x) == 0 else x[:size]) for x in EVERY]
+    brf, slopes = of_a_cpu()
+    slopes = [
+        np.sum(slope[:size]) if np.ndim(x) == 0 else slope[:size]
+        for slope, x in zip(slopes, EVERY, strict=True)
+    ]
+    expected = (np.sum(brf[:size] * np.arange(size)), brf[:size]), slopes
     request.getfixturevalue("elsewhere")
-    found = of(*columns)
+    found = values_and_slopes(*columns)
     for ours, theirs in zip(*map(jax.tree.leaves, (found, expected)), strict=True):
         # Kernels are fused otherwise, and sums taken in another order.
         np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-13)

@@ -1,5 +1,7 @@
 """The way into a program, with one that takes no time to compile."""
 
+from functools import cache
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -109,16 +111,22 @@ TRANSFORMED = {
 @pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("name", TRANSFORMED)
 def test_every_transformation_is_that_of_the_function(name, compiled):
-    transform, given = TRANSFORMED[name]
-    if given is None:
-        given = np.moveaxis(np.stack([GIVEN[0], 2 * GIVEN[0]]), 0, 1), *GIVEN[1:]
-    found, expected = transform(through_the_door), transform(plain_of_arrays)
-    if compiled:
-        found = jax.jit(found)
-    pairs = zip(*(jax.tree.leaves(x(*given)) for x in (found, expected)), strict=True)
-    for a, b in pairs:
+    transform = TRANSFORMED[name][0](through_the_door)
+    found = (jax.jit(transform) if compiled else transform)(*arguments_of(name))
+    for a, b in zip(*map(jax.tree.leaves, (found, expected(name))), strict=True):
         assert a.shape == b.shape
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
+
+
+def arguments_of(name):
+    several = np.moveaxis(np.stack([GIVEN[0], 2 * GIVEN[0]]), 0, 1), *GIVEN[1:]
+    return TRANSFORMED[name][1] or several
+
+
+@cache
+def expected(name):
+    """What JAX itself makes of the function."""
+    return jax.jit(TRANSFORMED[name][0](plain_of_arrays))(*arguments_of(name))
 
 
 def plain_of_arrays(*given):

@@ -1,5 +1,7 @@
 """Columns whose value is told at once, and the others, which are put together and solved."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -24,7 +26,12 @@ def solved(columns):
 def columns(size, share):
     """So many columns, of which about that share is told."""
     rng = np.random.default_rng(size)
-    return jnp.stack([jnp.arange(1.0, size + 1), jnp.asarray(rng.random(size) - share)])
+    return np.stack([np.arange(1.0, size + 1), rng.random(size) - share])
+
+
+@partial(jax.jit, static_argnums=1)
+def told_or_solved(given, in_order):
+    return map_tiles(solved, given, WIDTH, (lambda x: -x[0]) if in_order else None, glance)
 
 
 @pytest.mark.parametrize("size", [5, 8, 9, 64, 100])
@@ -32,16 +39,16 @@ def columns(size, share):
 @pytest.mark.parametrize("in_order", [False, True])
 def test_columns_that_are_told_keep_their_value(size, share, in_order):
     given = columns(size, share)
-    found = map_tiles(solved, given, WIDTH, (lambda x: -x[0]) if in_order else None, glance)
-    wanted = given[0] + jnp.where(given[1] < 0, 0, 100)
+    found = told_or_solved(given, in_order)
+    wanted = given[0] + np.where(given[1] < 0, 0, 100)
     np.testing.assert_array_equal(found["light"], wanted)
     np.testing.assert_array_equal(found["twice"], 2 * wanted[None])
 
 
 def test_only_the_others_are_solved():
     """As many tiles as they fill, by what each tile says of itself; two of them for 11 of 64."""
-    given = jnp.stack([jnp.zeros(64), jnp.where(jnp.arange(64) % 6 == 1, 1.0, -1.0)])
-    others = int(jnp.sum(given[1] > 0))
+    given = np.stack([np.zeros(64), np.where(np.arange(64) % 6 == 1, 1.0, -1.0)])
+    others = int(np.sum(given[1] > 0))
     tiles = []
 
     def counted(x):
@@ -57,22 +64,31 @@ def test_only_the_others_are_solved():
 @pytest.mark.parametrize("size", [WIDTH, 3 * WIDTH])
 def test_neighbours_in_need_are_solved_together(size):
     """Each column gets the largest number of its tile: in order that is a near one."""
-    given = jnp.asarray(np.random.default_rng(0).permutation(size).astype(float))
+    given = np.random.default_rng(0).permutation(size).astype(float)
 
-    def largest(x):
-        return jnp.max(x) + 0 * x
+    @jax.jit
+    def solve(given):
+        def largest(x):
+            return jnp.max(x) + 0 * x
 
-    found = map_tiles(largest, given, WIDTH, lambda x: x, lambda x: (x, x < 0))
+        return map_tiles(largest, given, WIDTH, lambda x: x, lambda x: (x, x < 0))
+
+    found = solve(given)
     np.testing.assert_array_equal(found, WIDTH * (given // WIDTH) + WIDTH - 1)
+
+
+@jax.jit
+def those_in_need(given):
+    return map_tiles(
+        lambda x: 0 * x[1] + 5, given, WIDTH, lambda x: x[0], lambda x: (x[1], x[1] < 0)
+    )
 
 
 @pytest.mark.parametrize("need", [np.nan, np.inf])
 def test_what_is_not_told_is_solved_whatever_it_needs(need):
-    told = jnp.arange(5 * WIDTH) % 7 != 0
-    given = jnp.stack([jnp.where(told, 1.0, need), jnp.where(told, -1.0, 1.0)])
-    found = map_tiles(
-        lambda x: 0 * x[1] + 5, given, WIDTH, lambda x: x[0], lambda x: (x[1], x[1] < 0)
-    )
+    told = np.arange(5 * WIDTH) % 7 != 0
+    given = np.stack([np.where(told, 1.0, need), np.where(told, -1.0, 1.0)])
+    found = those_in_need(given)
     np.testing.assert_array_equal(found, np.where(told, -1, 5))
 
 
