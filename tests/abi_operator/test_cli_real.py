@@ -6,13 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from abi_operator import simulation
 from abi_operator.files import read_result
 from abi_operator.nomenclature import QUALITY_FLAGS
 
 
 @pytest.mark.real
-def test_hurricane_katrina(invoke, tmp_path):
-    """All four times of a real WRF file, the first of them at sunrise, in two kinds of band."""
+def test_hurricane_katrina(invoke, tmp_path, monkeypatch):
+    """All four times of a real WRF file, the first of them at sunrise, in two kinds of band.
+
+    In two blocks of rows, which chunks of one size fill where the whole would need two.
+    """
     folder = os.environ.get("ABI_OPERATOR_SAMPLE_DATA")
     if not folder:
         pytest.skip("ABI_OPERATOR_SAMPLE_DATA names no folder of real files")
@@ -20,6 +24,7 @@ def test_hurricane_katrina(invoke, tmp_path):
     out = tmp_path / "out"
     options = ["--ocean-albedo", 0.06, "--num-streams", 2, "--bands", "C02,C07"]
     options += ["--emissivity", "water"]
+    monkeypatch.setattr(simulation, "_BLOCK_COLUMNS", 1152)
     outcome = invoke("simulate", wrf, *options, "--out", out)
     assert outcome.exit_code == 0, outcome.output
     assert "warning: the model has no temperature of the ground" in outcome.stderr

@@ -1,5 +1,7 @@
 """Optics and solver in one program: tiles, doublings by what can be read, second derivatives."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,7 +10,7 @@ import pytest
 from programs import programs_anew
 from states import column
 
-from abi_operator import brf
+from abi_operator import bands_of_states, brf
 from abi_operator.machine import batching, sizes
 
 BANDS = ("C01",)
@@ -23,6 +25,8 @@ def varied(s):
 def columns(count=20):
     """Columns of two layers whose smoke and ground differ."""
     state = column(num_layers=2)
+    smoke = {"smoke": state.atmosphere.plumes["smoke"]}
+    state = replace(state, atmosphere=replace(state.atmosphere, plumes=smoke))
     state = jax.tree.map(lambda x: np.stack([np.asarray(x, float)] * count), state)
     vary = np.linspace(0.1, 1.0, count)
     return eqx.tree_at(varied, state, (vary, 0.5 * vary[::-1]))
@@ -104,8 +108,14 @@ def test_depths_that_are_read_are_no_reflectances(monkeypatch):
     """One column, of which the value is asked for before its slopes, and after them.
 
     Both read programs of the same state and settings: one that gives the largest optical depth, by
-    which slopes choose their doublings, and one that gives brf.
+    which slopes choose their doublings, and one that gives brf. Which of them is read does not
+    depend on what is solved: here the light that comes up through all layers.
     """
+
+    def light(columns, arguments, settings):
+        return arguments["albedo"] * jnp.exp(-0.1 * jnp.sum(arguments["tau"], axis=-1))
+
+    monkeypatch.setattr(bands_of_states, "_terms", light)
     state = column(liquid=0.5, num_layers=2)
 
     def value():

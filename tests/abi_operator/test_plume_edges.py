@@ -58,8 +58,8 @@ def depths(air):
 
 
 def test_depth_is_extinction_times_thickness_on_any_levels():
-    for air in (make_air(n) for n in (10, 27, 50)):
-        coefficient = aerosol(make_air(2), "smoke", BANDS["C01"]).tau.sum()
+    coefficient = depths(make_air(2)).sum()
+    for air in (make_air(n) for n in (10, 27, 51)):
         for levels in (air, edged(air)):
             np.testing.assert_allclose(depths(levels).sum(), coefficient, rtol=ROUNDING)
 
@@ -90,7 +90,7 @@ def test_levels_are_at_the_edges_and_nothing_is_lost():
 
 def test_new_levels_lie_where_a_standard_atmosphere_has_them():
     """Temperature is linear between levels, pressure exponential to what a layer's warmth is."""
-    air = make_air(50)
+    air = make_air(51)
     new = edged(air)
     fine = standard_atmosphere("us_standard", new.height)
     np.testing.assert_allclose(new.pressure, fine.pressure, rtol=2e-4)
@@ -206,6 +206,6 @@ def test_derivatives_in_height():
 
 
 def test_the_operator_puts_them_in_where_it_is_asked_to():
-    air = stacked([make_air(47), make_air(47, base=900.0)])
-    by_hand = seen(jax.jit(jax.vmap(with_plume_edges))(air))
+    air = stacked([make_air(51), make_air(51, base=900.0)])
+    by_hand = seen(edged(air))
     np.testing.assert_allclose(seen(air, plume_edges=True), by_hand, rtol=ROUNDING)

@@ -24,7 +24,7 @@ from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.surface import Lambertian, RossLi
 
 # As in `test_reflectance`, for its programs.
-OPTIONS = {"num_streams": 4, "num_doublings": 5}
+OPTIONS = {"num_streams": 4, "num_doublings": 4}
 BANDS = ("C06", "C01")
 LAYERS = 12
 

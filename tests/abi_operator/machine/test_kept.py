@@ -37,8 +37,8 @@ jax.monitoring.register_event_duration_secs_listener(
     lambda name, _, **more: traced.append(more) if name.endswith("jaxpr_trace_duration") else None
 )
 with jax.enable_x64(True):
-    tau, moments = np.linspace(0.1, 1, 24).reshape(4, 6), np.full((6, 5), 0.7 ** np.arange(5))
-    brf = toa_brf(tau, np.full(6, 0.9), moments, 0.2, 0.6, 0.8, 0.5, num_streams=4)
+    tau, moments = np.linspace(0.1, 1, 8).reshape(4, 2), np.full((2, 3), 0.7 ** np.arange(3))
+    brf = toa_brf(tau, np.full(2, 0.9), moments, 0.2, 0.6, 0.8, 0.5, num_streams=2, num_modes=1)
     found = program(2.0, np.eye(3) + 0.5)
     assert found["name"][1] is None
     print(np.asarray(brf).tobytes().hex(), np.asarray(found["root"]).tobytes().hex())

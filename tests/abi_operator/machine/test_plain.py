@@ -1,7 +1,5 @@
 """The off-switch of the operations of our own: without them the numbers are the same."""
 
-from functools import cache
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -54,39 +52,36 @@ def test_plain_jax_gives_the_same_value_and_gradient(num_streams):
     assert operations_of_ours(solve, given)
 
 
-mapped = jax.vmap(with_gradient(lambda *x: toa_brf(*x, **SMALL)))
-
-
-def of_the_operator():
-    """Two bands' slopes in the ground of one, and their values."""
-    state = column(num_layers=2)
-
-    def seen(albedo):
-        changed = eqx.tree_at(lambda s: s.albedo["C01"], state, albedo)
-        return brf(changed, ("C01", "C02"), num_streams=2, num_modes=1, num_doublings=2)
-
-    return with_gradient(seen)(0.2)
-
-
-@cache
-def by_plain_jax():
-    """What the tests below ask, in one block: JAX forgets what it has compiled at its ends."""
+@pytest.mark.slow
+def test_plain_jax_maps_columns():
     given = small_columns()
+    solve = jax.vmap(with_gradient(lambda *x: toa_brf(*x, **SMALL)))
+    expected = solve(*given)
     with plain_jax():
-        none = toa_brf(*(x[:0] for x in given), num_streams=2)
-        return jax.jit(mapped)(*given), none, of_the_operator()
-
-
-def test_plain_jax_maps_columns_and_takes_none():
-    found, none, _ = by_plain_jax()
-    close(found, mapped(*small_columns()), MAPPED)
-    assert none.shape == (0,)
+        close(jax.jit(solve)(*given), expected, MAPPED)
 
 
 def test_plain_jax_is_for_the_operator_too():
-    """Whose bands then are solved without any of their rules."""
-    *_, found = by_plain_jax()
-    close(found, of_the_operator())
+    """Whose bands then are solved without any of their rules, mapped over columns or of none."""
+    state = column(num_layers=2)
+    varied = (
+        lambda s: s.albedo["C01"],
+        lambda s: s.atmosphere.plumes["smoke"].extinction_550,
+        lambda s: s.geometry.solar_zenith,
+        lambda s: s.geometry.view_zenith,
+    )
+
+    def seen(*given):
+        changed = eqx.tree_at(lambda s: [read(s) for read in varied], state, given)
+        return brf(changed, ("C01", "C02"), num_streams=2, num_modes=1, num_doublings=2)
+
+    solve = jax.vmap(with_gradient(seen))
+    given = [np.array([0.9, 1.0, 1.1]) * np.asarray(read(state)) for read in varied]
+    expected = solve(*given)
+    with plain_jax():
+        close(jax.jit(solve)(*given), expected, MAPPED)
+        none = [x[:0] for x in small_columns()]
+        assert toa_brf(*none, num_streams=2).shape == (0,)
 
 
 def test_the_switch_is_on_again_after_the_last_block_and_after_trouble(monkeypatch):
