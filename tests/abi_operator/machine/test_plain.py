@@ -52,7 +52,6 @@ def test_plain_jax_gives_the_same_value_and_gradient(num_streams):
     assert operations_of_ours(solve, given)
 
 
-@pytest.mark.slow
 def test_plain_jax_maps_columns():
     given = small_columns()
     solve = jax.vmap(with_gradient(lambda *x: toa_brf(*x, **SMALL)))
