@@ -139,6 +139,19 @@ def without_the_equations_own(rows, where, precision):
     print(f"Signs that the equations have by themselves, by 40 digits: {taken} columns\n")
 
 
+def without_what_is_conserved(rows, where, precision):
+    """Leave columns that absorb nothing, and fail "absorption", to "energy", which asks the very
+    same number of them."""
+    taken = 0
+    for i in np.flatnonzero(failed(rows, "absorption", precision)):
+        number, index, row = where[i]
+        columns = columns_of(GROUPS[number], index, precision).columns
+        absorbed = columns["tau"][row] * (1 - columns["ssa"][row])
+        if not absorbed.any() and columns["albedo"][row] == 1:
+            rows["absorption"][i], taken = np.nan, taken + 1
+    print(f"Columns that absorb nothing, judged by energy alone: {taken}\n")
+
+
 def without_the_quotients_own(rows, where, precision):
     """Compare slopes that fail over a longer step as well: what rounding leaves of a quotient is
     the less, the longer its step. Of single precision no slope fails."""
@@ -248,6 +261,7 @@ def main():
     took = run(folder, options.columns, options.precision, groups)
     rows, where = read(folder, options.columns, options.precision, groups)
     without_the_equations_own(rows, where, options.precision)
+    without_what_is_conserved(rows, where, options.precision)
     without_the_quotients_own(rows, where, options.precision)
     by_stratum(rows, options.precision)
     by_check(rows, where, options.precision)

@@ -28,7 +28,6 @@ LIMITED_BY = dict.fromkeys(CHECKS, "rounding") | {
     "finite value": "",
     "finite slopes": "",
     "energy": DEPTH,
-    "absorption": DEPTH,
     "reciprocity": DEPTH,
     "slope": "the quotient: rounding of values over its step",
     "inside jit": DEPTH + ", of light of one layer seen through them",

@@ -4,40 +4,9 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pytest
-
-import abi_operator
-from abi_operator import solver
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
-
-# Doors that README's code asks, and how many streams they are asked for here: as few as make
-# programs small, as what is tested holds at any number; None for those of README, and of the doors.
-DOORS = (
-    (abi_operator, ("reflectance_factor", "radiance")),
-    (solver, ("surface_coupling", "toa_albedo", "toa_brf", "toa_radiance")),
-)
-STREAMS = [2, pytest.param(None, marks=pytest.mark.slow)]
-
-
-def with_streams(door, num_streams):
-    """A door that solves with so many streams, whatever it is asked for."""
-
-    def asked(*arguments, **settings):
-        return door(*arguments, **(settings | {"num_streams": num_streams}))
-
-    return asked
-
-
-@pytest.fixture(params=STREAMS, ids=["few streams", "its own streams"])
-def streams(request, monkeypatch):
-    """What README's code imports solves with so many streams."""
-    if request.param is not None:
-        for module, names in DOORS:
-            for name in names:
-                door = with_streams(getattr(module, name), request.param)
-                monkeypatch.setattr(module, name, door)
 
 
 def run_block(number, names=None):
@@ -49,7 +18,6 @@ def run_block(number, names=None):
     return names
 
 
-@pytest.mark.usefixtures("streams")
 def test_the_operators_blocks_run():
     names = run_block(0)
     slope = names["K"].atmosphere.plumes["smoke"].ssa["C01"]
@@ -60,7 +28,6 @@ def test_the_operators_blocks_run():
     assert seen.saturated and abs(seen.brightness_temperature - 411.86) < 0.01
 
 
-@pytest.mark.usefixtures("streams")
 def test_the_solvers_block_runs():
     names = run_block(2)
     # Two solves of the same columns, in one of which the ground is a closed form.

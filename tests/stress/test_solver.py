@@ -95,6 +95,20 @@ def test_a_longer_step_compares_the_same_slope(monkeypatch):
     assert 0 < stress.over_a_longer_step(SUNLIT, 0, 0, "float64") < 1e-6
 
 
+def test_columns_that_absorb_are_not_left_to_energy(monkeypatch):
+    """Of three that fail one absorbs nothing; in another the ground does, and in one the air."""
+    batch = stress.columns_of(SUNLIT, 0, "float64")
+    own = {name: batch.columns[name].copy() for name in ("tau", "ssa", "albedo")}
+    own["tau"][:3], own["ssa"][:3], own["albedo"][:3] = 1.0, 1.0, 1.0
+    own["albedo"][1], own["ssa"][2, 0] = 1 - 1e-9, 1 - 1e-9
+    changed = batch._replace(columns=batch.columns | own)
+    monkeypatch.setattr(stress, "columns_of", lambda *_: changed)
+    rows = np.zeros(4, stress.FIELDS)
+    rows["absorption"][:3] = 2 * LIMITS["absorption"][0]
+    stress.without_what_is_conserved(rows, [(0, 0, row) for row in range(4)], "float64")
+    assert np.isnan(rows["absorption"]).tolist() == [True, False, False, False]
+
+
 def test_columns_follow_from_the_name_of_their_batch():
     """What makes a run that was stopped go on to the same bytes."""
     first, again = (stress.columns_of(SUNLIT, 3, "float64") for _ in range(2))
