@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import long_runs_commands as commands
@@ -29,7 +30,8 @@ from long_runs_operator import COUNT, KINDS
 NAMES = ("simulate", "retrieve", "observe")
 HANGS = "fork"  # after JAX has begun, as README says
 PATIENCE = 120.0  # [s]
-# NetCDF keeps an index of the chunks of an open file in memory, some 4 kB for each block.
+# HDF5 keeps what it knows of an open file's chunks in a cache, some 4 kB for each block, until that
+# is full, before the second third of thousands of blocks begins.
 FLAT = 1.0  # [kB a block]
 
 
@@ -89,6 +91,15 @@ def worker_dies(cache):
     return Found(COUNT, [f"{COUNT - same} other"] * (COUNT - same), said)
 
 
+def dask_worker_dies(cache):
+    """The same of dask, which gives to others what a worker leaves."""
+    if find_spec("distributed") is None:
+        return Found(0, [], "not tried: dask's `distributed` is not installed")
+    same, died, _ = script("operator", "dask", cache=cache, timeout=PATIENCE)
+    failed = [f"{COUNT - same} other"] * (COUNT - same) + ["no worker died"] * (not died)
+    return Found(COUNT, failed, f"{died} of 2 workers killed, {same} of {COUNT} answers the same")
+
+
 def checks(folder, arguments):
     """Names, and what makes the rows."""
     place, cache = Place(folder), folder / "programs-of-scripts"
@@ -107,6 +118,7 @@ def checks(folder, arguments):
     for kind in KINDS:
         yield f"numbers: {kind}", partial(same_numbers, kind, cache)
     yield "numbers: a worker that dies", partial(worker_dies, cache)
+    yield "numbers: a worker of dask that dies", partial(dask_worker_dies, cache)
 
 
 def _made(folder):

@@ -2,19 +2,22 @@
 
     python long_runs_operator.py KIND
 
-computes in a pool of the KIND and prints how many of the answers are the same, JSON: those of a
-pool that hangs are never printed, which is why it is a process of its own. It is imported by the
-processes that it spawns.
+computes in a pool of the KIND, ``dies`` in one whose process is killed, ``dask`` in workers of dask
+of which one is, and prints how many of the answers are the same, JSON: those of a pool that hangs
+are never printed, which is why it is a process of its own. It is imported by the processes that it
+spawns.
 """
 
 import json
 import os
 import signal
 import sys
+import tempfile
 import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -99,6 +102,32 @@ def with_a_worker_that_dies():
     return found, str(errors[lost[0]]), again
 
 
+def answer_after_a_death(number, mark):
+    """The same of a worker that is killed at one of the calls, but not when that is asked again."""
+    if number == LETHAL and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return prepared_answer(number)
+
+
+def with_dask():
+    """Answers of two workers of dask, and how many have been killed; dask asks others in turn."""
+    from distributed import Client, LocalCluster
+
+    with tempfile.TemporaryDirectory() as folder:
+        mark = Path(folder) / "died"
+        cluster = LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            dashboard_address=None,
+            local_directory=folder,
+            silence_logs="CRITICAL",
+        )
+        with cluster, Client(cluster) as client:
+            futures = client.map(answer_after_a_death, range(COUNT), mark=mark)
+            return dict(enumerate(client.gather(futures))), int(mark.exists())
+
+
 def main():
     kind = sys.argv[1]
     if kind == "fork before JAX":
@@ -110,6 +139,10 @@ def main():
         before, error, after = with_a_worker_that_dies()
         number = sum(same(x, known[n]) for n, x in (before | after).items())
         print(json.dumps([number, len(before), error]))
+        return
+    if kind == "dask":
+        found, died = with_dask()
+        print(json.dumps([sum(same(x, known[n]) for n, x in found.items()), died, ""]))
         return
     if kind != "fork before JAX":
         found = answers(kind)
