@@ -56,8 +56,9 @@ def simulate(
     albedo: Annotated[
         Path | None,
         typer.Option(
-            help="How bright the land is: MODIS albedo MCD43A1, Band1, Band2, Band3, Band6 and "
-            "Band7, as a NetCDF file from AppEEARS."
+            help="How bright the land is: MODIS albedo MCD43A1 (kernel weights and quality) of "
+            "Band1, 2, 3, 6 and 7, also of Band5 for C04 and C05 and of Band4 for green, as a "
+            "NetCDF file from AppEEARS, projection Geographic."
         ),
     ] = None,
     ocean_albedo: Annotated[
@@ -243,12 +244,12 @@ def simulate(
     """Simulate what the imager would see of a scene in a weather model's output.
 
     Writes a folder with result.nc (reflectances and radiances of every band, and what they were
-    computed from) and a picture of every time. Columns over land need --albedo and those over water
-    --ocean-albedo.
+    computed from) and a picture of every time. Land needs --albedo or --land-albedo, water
+    --ocean-albedo or --ocean-wind; columns without an albedo are left out (flag no_albedo).
 
     \b
-    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --ocean-albedo 0.06 --out sea
-    abi-operator simulate wrfout_d01_2005-08-28_12:00:00 --albedo MCD43A1.nc \\
+    abi-operator simulate wrfout_d01_2005-08-28_18:00:00 --ocean-albedo 0.06 --out sea
+    abi-operator simulate wrfout_d01_2005-08-28_18:00:00 --albedo MCD43A1.nc \\
         --ocean-albedo 0.03 --bands all --emissivity grassland --out coast
 
     `abi-operator demo --size 16` makes files to try it with.

@@ -168,7 +168,7 @@ def score(
         Path | None,
         typer.Option(
             help="Folder for pictures of truth, retrieval and error, scatter and coverage; needs "
-            "matplotlib (pip install 'abi-operator[plot]')."
+            "matplotlib (pip install matplotlib)."
         ),
     ] = None,
 ) -> None:
@@ -197,7 +197,7 @@ def _pictures() -> Any:
         return import_module("retrievals.scoring.pictures")
     except ModuleNotFoundError as error:
         raise InputError(
-            f"--plot needs {error.name}; install it with pip install 'abi-operator[plot]'."
+            f"--plot needs {error.name}; install it with pip install matplotlib."
         ) from error
 
 

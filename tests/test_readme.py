@@ -4,32 +4,23 @@ import re
 from pathlib import Path
 
 import numpy as np
+from readme import README, run_block
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text()
-
-
-def run_block(number, names=None):
-    """Run a block of README, after another whose `names` it goes on with; return all names."""
-    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
-    assert len(blocks) == 3
-    names = dict(names or {})
-    exec(compile(blocks[number], "README.md", "exec"), names)
-    return names
 
 
 def test_the_operators_blocks_run():
-    names = run_block(0)
+    names = run_block(1)
     slope = names["K"].atmosphere.plumes["smoke"].ssa["C01"]
     assert slope.shape == names["rho"].shape == (7,)
     assert slope[0] > 0 and (slope[1:] == 0).all()
-    names = run_block(1, names)
+    names = run_block(2, names)
     seen = names["observe_mean"](names["seen"][-1], "C07")
     assert seen.saturated and abs(seen.brightness_temperature - 411.86) < 0.01
 
 
 def test_the_solvers_block_runs():
-    names = run_block(2)
+    names = run_block(3)
     # Two solves of the same columns, in one of which the ground is a closed form.
     np.testing.assert_allclose(names["response"].brf(0.1), names["brf"], rtol=1e-12)
     np.testing.assert_allclose(names["quick"], names["brf"], rtol=1e-3)

@@ -24,7 +24,7 @@ def experiment(
         Path | None,
         typer.Option(
             help="Folder for the table (NetCDF) and a picture of it; needs matplotlib "
-            "(pip install 'abi-operator[plot]')."
+            "(pip install matplotlib)."
         ),
     ] = None,
     size: Annotated[
@@ -74,5 +74,5 @@ def _figures() -> Any:
         return import_module("matplotlib.figure")
     except ModuleNotFoundError as error:
         raise InputError(
-            f"--output needs {error.name}; install it with pip install 'abi-operator[plot]'."
+            f"--output needs {error.name}; install it with pip install matplotlib."
         ) from error

@@ -77,9 +77,7 @@ def tune(
     time: Annotated[int, typer.Option(min=0, help="Which of the result's times, from 0.")] = 0,
     plot: Annotated[
         bool,
-        typer.Option(
-            "--plot", help="Draw maps and histograms; needs matplotlib ('abi-operator[plot]')."
-        ),
+        typer.Option("--plot", help="Draw maps and histograms; needs matplotlib."),
     ] = False,
 ) -> None:
     """Compare a scene with what was observed of it, and tune its plume, as Grasso et al. did.
@@ -143,7 +141,7 @@ def _pictures() -> Any:
             return import_module("retrievals.tuning.pictures")
         except ModuleNotFoundError as error:
             raise InputError(
-                f"--plot needs {error.name}; install it with pip install 'abi-operator[plot]'."
+                f"--plot needs {error.name}; install it with pip install matplotlib."
             ) from error
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import typer
 import xarray as xr
+from readme import run_block
 from typer.testing import CliRunner
 
 from abi_operator.files import InputError, ResultWriter
@@ -107,6 +108,14 @@ def test_the_demonstration_ends_with_scores(folder, capsys):
         assert (written["result_code"] == ResultCode.SUCCESS).sum() >= 10
     assert (folder / "scores.csv").is_file()
     assert "inside EE" in capsys.readouterr().out
+
+
+def test_readmes_code_retrieves(folder, monkeypatch):
+    (folder / "abi-demo").mkdir()
+    (folder / "result.nc").rename(folder / "abi-demo" / "result.nc")
+    monkeypatch.chdir(folder)
+    names = run_block(0)
+    assert (names["found"]["result_code"] == ResultCode.SUCCESS).sum() >= 5
 
 
 def test_trouble_is_one_sentence(folder, run):
