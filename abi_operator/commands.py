@@ -34,7 +34,8 @@ def typed(context: typer.Context) -> str:
         elif isinstance(value, bool):
             words.append((parameter.opts if value else parameter.secondary_opts)[0])
         else:
-            words += [parameter.opts[0], *_words(value)]
+            for word in _words(value):
+                words += [parameter.opts[0], word]
     return shlex.join(words)
 
 

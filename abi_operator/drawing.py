@@ -65,7 +65,8 @@ class Painter:
             write_png(self._folder / self.names[-1], picture)
             if np.isnan(picture).all():
                 warnings.warn(
-                    f"{self.names[-1]} is empty: nothing of it was simulated; the flags say why.",
+                    f"{self.names[-1]} is empty: it shows no sunlight by night, and nothing "
+                    "without albedo or out of sight; quality_flag says which.",
                     stacklevel=2,
                 )
 

@@ -276,14 +276,23 @@ def variable(name: str) -> Variable | None:
     ):
         if name in table:
             return table[name]
-    owner, _, quantity = name.partition("_")
-    words = HYDROMETEORS.get(owner, f"the {owner} plume")
-    if quantity == "optical_depth":
-        return Variable(("band", "y", "x"), "1", f"optical depth of {words}")
-    if quantity == "mass_path":
-        return Variable(("layer", "y", "x"), "kg m-2", f"{words} of the layer")
-    if quantity == "number_path":
-        return Variable(("layer", "y", "x"), "m-2", f"particles of {words} of the layer")
-    if quantity == "aod_550":
-        return Variable(HORIZONTAL, "1", f"optical depth of {words} at 550 nm")
-    return PLUME.get(quantity)
+    # A species may have a name of several words.
+    owners = {quantity: name.removesuffix(f"_{quantity}") for quantity in (*_OF_AN_OWNER, *PLUME)}
+    for quantity, owner in owners.items():
+        if owner in ("", name):
+            continue
+        if quantity in PLUME:
+            return PLUME[quantity]
+        words = HYDROMETEORS.get(owner, f"the {owner} plume")
+        dims, units, said = _OF_AN_OWNER[quantity]
+        return Variable(dims, units, said.format(words))
+    return None
+
+
+_OF_AN_OWNER = {
+    "optical_depth": (("band", "y", "x"), "1", "optical depth of {}"),
+    "mass_path": (("layer", "y", "x"), "kg m-2", "{} of the layer"),
+    "number_path": (("layer", "y", "x"), "m-2", "particles of {} of the layer"),
+    "aod_550": (HORIZONTAL, "1", "optical depth of {} at 550 nm"),
+}
+"""Dimensions, units and meaning of what each class of hydrometeors or each plume has."""

@@ -29,6 +29,7 @@ from .files import (
     rounded,
     stored,
 )
+from .nomenclature import OPTIONAL_RESULT
 from .optics import ash, smoke
 from .radiance import THERMAL
 from .report import account_lines, flag_lines, plume_lines
@@ -123,6 +124,11 @@ def open_scene(request: Request) -> Scene:
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
     check_variables(request.variables)
+    if set(request.variables) & set(OPTIONAL_RESULT) and not set(request.bands) & set(THERMAL):
+        raise InputError(
+            f"{', '.join(OPTIONAL_RESULT)} is of {', '.join(THERMAL)}; simulate it, or leave the "
+            "variable out."
+        )
     series = open_wrf_series(request.wrf)
     times = series.find(request.time)
     coordinates = series.coordinates(times[0])
@@ -139,7 +145,7 @@ def open_scene(request: Request) -> Scene:
         albedo = read_mcd43a1(
             request.albedo, solar, broadband=request.broadband, kernels=request.land_kernels
         )
-    elif request.land_kernels:
+    elif request.land_kernels and request.albedo is None:
         raise InputError("kernels of the land are those of an albedo file; name one (--albedo).")
     fires = None if request.fires is None else read_fires(request.fires)
     inside = None

@@ -37,8 +37,8 @@ def output_folder(
     Parameters
     ----------
     path
-        Folder for the output, made with its parents if need be; files of the same name in it are
-        replaced, others stay.
+        Folder for the output, made with its parents if need be, or a link to one; files of the same
+        name in it are replaced, others stay.
     outdated
         Gives names of files in `path` that go where they are not replaced, when all is ready to be
         moved: another run may just have put them there.
@@ -50,7 +50,7 @@ def output_folder(
     InputError
         Where the output cannot be written, or there is no room for it.
     """
-    target = Path(path).absolute()
+    target = Path(path).resolve()  # a link may lead to another file system
     existing = _existing(target)
     inside = os.path.ismount(target) or not os.access(target.parent, os.W_OK)
     beside = existing if existing != target or inside else target.parent
@@ -82,7 +82,7 @@ def output_folder(
 
 def check_output_folder(path: str | PathLike[str]) -> None:
     """Raise `InputError` where an `output_folder` cannot be written, before it is needed."""
-    with _writable(_existing(Path(path).absolute())):
+    with _writable(_existing(Path(path).resolve())):
         pass
 
 

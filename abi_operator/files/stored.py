@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from ..nomenclature import variable
+from ..nomenclature import MODEL, OPTIONAL, SCENARIO, variable
 from .errors import InputError
 
 ALL, IMAGE = "all", "image"
@@ -33,7 +33,8 @@ def check_variables(names: Sequence[str]) -> tuple[str, ...]:
     names = tuple(names)
     if names in ((ALL,), (IMAGE,)):
         return names
-    unknown = [name for name in names if variable(name) is None]
+    of_models = set(MODEL) - set(SCENARIO) - set(OPTIONAL)
+    unknown = [name for name in names if variable(name) is None or name in of_models]
     if unknown or not names:
         raise InputError(
             f"variables {unknown} are not those of a result; give {ALL}, {IMAGE} or names such as "

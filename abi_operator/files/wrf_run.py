@@ -34,8 +34,13 @@ ADVICE = "give a WRF output file (wrfout_*) that holds them"
 """What to do about a file that lacks what is needed."""
 
 
+_SECONDS = {"seconds": 1, "minutes": 60, "hours": 3600, "days": 86400}
+_SINCE = " since "
+
+
 def times_of(file: xr.Dataset, path: FilePath) -> np.ndarray:
-    """The times of a file, from `Times` or, failing that, from minutes since the start."""
+    """The times of a file, from `Times` or, failing that, from `XTIME` in the units that it has:
+    minutes since the start of the run where they do not say."""
     if "Times" in file:
         texts = [
             text.decode("latin-1") if isinstance(text, bytes) else str(text)
@@ -43,22 +48,37 @@ def times_of(file: xr.Dataset, path: FilePath) -> np.ndarray:
         ]
         return np.array([_time(text, "Times", path) for text in texts])
     start = file.attrs.get("SIMULATION_START_DATE", file.attrs.get("START_DATE"))
-    if "XTIME" not in file or start is None:
+    units = str(file["XTIME"].attrs.get("units", "")).strip() if "XTIME" in file else ""
+    unit, since, reference = units.partition(_SINCE)
+    if "XTIME" not in file or (start is None and not since):
         raise InputError(f"{path} has no Times, nor XTIME with SIMULATION_START_DATE; {ADVICE}.")
-    minutes = load_finite(file["XTIME"], path)
-    seconds = np.rint(60 * np.atleast_1d(minutes)).astype("timedelta64[s]")
-    return _time(str(start), "SIMULATION_START_DATE", path) + seconds.astype("timedelta64[ns]")
+    step = _SECONDS.get(unit.strip() or "minutes")
+    if step is None:
+        raise InputError(
+            f"XTIME in {path} is in {units!r}; it should be in minutes since the start of the run, "
+            f"or in {', '.join(_SECONDS)}{_SINCE}a time."
+        )
+    begin = (
+        _time(reference, "the units of XTIME", path)
+        if since
+        else _time(str(start), "SIMULATION_START_DATE", path)
+    )
+    seconds = np.rint(step * np.atleast_1d(load_finite(file["XTIME"], path)).astype(float))
+    return begin + seconds.astype("timedelta64[s]").astype("timedelta64[ns]")
 
 
 def _time(text: str, name: str, path: FilePath) -> np.datetime64:
     """Parse WRF's way of writing a time, ``2007-10-23_18:00:00``."""
     try:
-        return np.datetime64(text.strip("\0 ").replace("_", "T"), "ns")
-    except ValueError as error:
+        time = np.datetime64(text.strip("\0 ").replace("_", "T"), "ns")
+    except ValueError:
+        time = np.datetime64("NaT", "ns")
+    if np.isnat(time):
         raise InputError(
             f"{name} in {path} is {text!r}, which is no time; "
             "it should be written as 2007-10-23_18:00:00."
-        ) from error
+        )
+    return time
 
 
 def moves(file: xr.Dataset) -> bool:

@@ -43,14 +43,14 @@ def hard_ceiling(
 ) -> Float[Array, "*shape"]:
     """Radiance, or the ceiling where it is higher: what the instrument does.
 
-    Above the ceiling the derivative with respect to radiance is 0.
+    Above the ceiling the derivative with respect to radiance is 0. What is NaN stays NaN.
 
     Parameters
     ----------
     radiance, ceiling
         Radiance of a footprint and the highest that can be told. [W m-2 sr-1 um-1]
     """
-    return jnp.where(radiance < ceiling, radiance, ceiling)
+    return jnp.where(radiance >= ceiling, ceiling, radiance)
 
 
 def smooth_ceiling(

@@ -40,9 +40,11 @@ def footprint_mean(
         Radiance of the cells, not limited. [W m-2 sr-1 um-1]
     weights
         Area of each cell in the footprint, in any one unit. Where all are 0, the footprint sees
-        nothing and its mean is NaN, with derivative 0.
+        nothing and its mean is NaN, with derivative 0; so it is where it sees a cell that is NaN.
     """
-    return _quotient(jnp.sum(weights * radiance), jnp.sum(weights))
+    lost, lit = _parted(radiance)
+    holed = jnp.sum(weights * lost) > 0
+    return _quotient(jnp.sum(weights * lit), jnp.where(holed, 0, jnp.sum(weights)))
 
 
 def image_mean(
@@ -61,8 +63,18 @@ def image_mean(
     """
     total = jnp.sum(weights_y, axis=1)[:, None] * jnp.sum(weights_x, axis=1)[None, :]
     exact = jax.lax.Precision.HIGHEST
-    sums = jnp.einsum("ij,jl,kl->ik", weights_y, radiance, weights_x, precision=exact)
-    return _quotient(sums, total)
+    lost, sums = (
+        jnp.einsum("ij,jl,kl->ik", weights_y, cells, weights_x, precision=exact)
+        for cells in _parted(radiance)
+    )
+    return _quotient(sums, jnp.where(lost > 0, 0, total))
+
+
+def _parted(radiance: Float[Array, "*shape"]) -> tuple[Array, Array]:
+    """1 where a cell is NaN and 0 elsewhere; and radiance, which is 0 there: a sum over all cells
+    would hand NaN to pixels that do not see it."""
+    lost = jnp.isnan(radiance)
+    return lost.astype(radiance.dtype), jnp.where(lost, 0, radiance)
 
 
 def _quotient(numerator: Float[Array, "*shape"], total: Float[Array, "*shape"]) -> Array:

@@ -48,7 +48,7 @@ def column_states(
         Bands for which albedo and plumes are wanted.
     num_streams
         Streams by which anisotropic grounds are integrated (`land_and_sea`); None for those of the
-        result, 8 of a scenario.
+        result, `settings.NUM_STREAMS` of a scenario.
 
     Returns
     -------

@@ -65,7 +65,17 @@ def fires_inside(fires: xr.Dataset, place: xr.Dataset) -> np.ndarray:
         As `files.read_fires` returns them.
     place
         With ``latitude`` and ``longitude`` (y, x) of all columns. [degree]
+
+    Raises
+    ------
+    InputError
+        Where a scene of one row or column tells no cells' corners.
     """
+    if min(place["latitude"].shape) < 2:
+        raise InputError(
+            "fires need the corners of the model's cells, which only a scene of two rows and "
+            "columns or more tells."
+        )
     bounds = cell_bounds(place["latitude"].values, place["longitude"].values)
     return _cell_of(fires, *bounds) >= 0
 

@@ -55,12 +55,16 @@ def observed(
     Raises
     ------
     InputError
-        Where the result has no radiance or was observed before, or the footprint is none.
+        Where the result lacks radiance or the sun's angle or was observed before, or the footprint
+        is none.
     """
     if "saturated" in result.variables:
         raise InputError("the result was observed before; give the one that a simulation wrote.")
-    if "radiance" not in result.variables:
-        raise InputError("the result has no radiance; simulate it without --variables.")
+    missing = [x for x in ("radiance", "solar_zenith_angle") if x not in result.variables]
+    if missing:
+        raise InputError(
+            f"the result has no {', '.join(missing)}; simulate it without --variables."
+        )
     smallest = min(result.sizes["y"], result.sizes["x"])
     if not 1 <= footprint <= smallest:
         raise InputError(f"a footprint is 1 to {smallest} columns wide here; got {footprint}.")

@@ -80,8 +80,8 @@ def simulate(
         and hydrometeors; with C07 brightness temperature; and the share of hydrometeors' optical
         depth at sizes for which optics were not fitted, by which pixels are flagged
         ``outside_fit``. C07 has no reflectance factor and no brf, which are NaN. By night the
-        reflectance factor is 0 and brf NaN; without albedo, and out of the satellite's sight, all
-        is NaN. The reflectance factor of a fire is that of its radiance, by night too.
+        reflectance factor is 0 and brf NaN; out of the satellite's sight, and by day without
+        albedo, all is NaN. The reflectance factor of a fire is that of its radiance, by night too.
 
     Raises
     ------

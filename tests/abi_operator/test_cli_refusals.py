@@ -119,6 +119,8 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--ocean-albedo", "0.1", "--time", "2005-08-28"], "has no time 2005-08-28; it has"),
         (["--ocean-albedo", "1.5"], "--ocean-albedo"),
         (["--variables", "radiances"], "variables ['radiances'] are not those of a result"),
+        (["--variables", "land_mask"], "variables ['land_mask'] are not those of a result"),
+        (["--variables", "brightness_temperature"], "brightness_temperature is of C07"),
         (["--satellite-longitude", "90"], "GOES-19 without --satellite-longitude, or"),
         (["--land-kernels"], "kernels of the land are those of an albedo file"),
         (["--ocean-wind", "gale"], "no wind is known by the name of 'gale'"),

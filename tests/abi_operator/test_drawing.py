@@ -91,5 +91,5 @@ def test_a_picture_of_nothing_is_warned_of(tmp_path):
     painter = Painter(tmp_path, np.array(["2007-10-23T06:00"], "datetime64[ns]"), SHAPE[0])
     image = scene(("C02",), 0.2)
     image["brf"][:] = np.nan  # by night
-    with pytest.warns(UserWarning, match="C02_2007-10-23T060000.png is empty: nothing"):
+    with pytest.warns(UserWarning, match="C02_2007-10-23T060000.png is empty: it shows"):
         painter.add(0, slice(0, 4), image)

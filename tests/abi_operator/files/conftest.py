@@ -50,7 +50,8 @@ def write_wrf_twin(tmp_path):
         timeless: tuple[str, ...] = (),
         times: str | None = "DateStrLen",
         time_texts: tuple[str, ...] = TIMES,
-        xtime: bool = False,
+        xtime: tuple[float, ...] = (),
+        xtime_units: str = "",
         name: str = "wrfout_d01_2007-10-23_18:00:00",
     ) -> Path:
         fields = {n: f for n, f in (wrf_fields() | (extra or {})).items() if n not in without}
@@ -69,7 +70,9 @@ def write_wrf_twin(tmp_path):
                 characters = np.array([list(text) for text in time_texts], "S1")
                 file.createVariable("Times", "S1", ("Time", times))[:] = characters
             if xtime:
-                file.createVariable("XTIME", "f4", ("Time",))[:] = [0.0, 30.0]
+                variable = file.createVariable("XTIME", "f4", ("Time",))
+                variable[:] = xtime
+                variable.units = xtime_units
         return path
 
     return write

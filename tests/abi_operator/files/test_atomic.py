@@ -30,6 +30,18 @@ def test_files_appear_when_the_block_ends(tmp_path):
     assert not folder.exists()
 
 
+def test_a_link_to_a_folder_is_followed(tmp_path):
+    """It may lead to another file system, on which the unfinished files have to be."""
+    there = tmp_path / "elsewhere" / "runs"
+    there.mkdir(parents=True)
+    (tmp_path / "out").symlink_to(there)
+    check_output_folder(tmp_path / "out")
+    with output_folder(tmp_path / "out") as folder:
+        assert folder.parent == there.parent
+        (folder / "a").write_text("new")
+    assert (there / "a").read_text() == "new" and (tmp_path / "out").is_symlink()
+
+
 def test_files_of_the_same_name_are_replaced_and_others_stay(tmp_path):
     target = tmp_path / "out"
     target.mkdir()

@@ -88,10 +88,24 @@ def test_times_are_read_whatever_their_dimension_is_called(write_wrf_twin, dimen
     assert coordinates["time"].dtype == "datetime64[ns]"
 
 
-def test_times_come_from_xtime_where_there_are_no_others(write_wrf_twin):
-    coordinates = wrf_coordinates(write_wrf_twin(times=None, xtime=True))
+@pytest.mark.parametrize(
+    ("numbers", "units"),
+    [
+        ((0.0, 30.0), ""),
+        ((0.0, 30.0), "minutes since 2007-10-23 18:00:00"),
+        ((42.0, 42.5), "hours since 2007-10-22 00:00:00"),
+    ],
+)
+def test_times_come_from_xtime_where_there_are_no_others(write_wrf_twin, numbers, units):
+    file = write_wrf_twin(times=None, xtime=numbers, xtime_units=units)
     expected = np.array(["2007-10-23T18:00", "2007-10-23T18:30"], "datetime64[ns]")
-    np.testing.assert_array_equal(coordinates["time"], expected)
+    np.testing.assert_array_equal(wrf_coordinates(file)["time"], expected)
+
+
+def test_units_of_xtime_that_are_none_are_refused(write_wrf_twin):
+    for units, words in (("fortnights", "in 'fortnights'"), ("hours since then", "no time")):
+        with pytest.raises(InputError, match=words):
+            wrf_coordinates(write_wrf_twin(times=None, xtime=(0.0, 1.0), xtime_units=units))
 
 
 def test_positions_may_be_written_once_for_all_times(write_wrf_twin):
@@ -268,9 +282,9 @@ def test_a_layer_without_thickness_is_refused(twin):
 
 
 def test_a_time_that_is_none_is_refused(write_wrf_twin):
-    texts = ("2007-10-23_18:00:00", "0000-00-00_00:00:00")
-    with pytest.raises(InputError, match="Times in .* is '0000-00-00_00:00:00', which is no time"):
-        wrf_coordinates(write_wrf_twin(time_texts=texts))
+    for text in ("0000-00-00_00:00:00", " " * 19):
+        with pytest.raises(InputError, match=f"Times in .* is '{text}', which is no time"):
+            wrf_coordinates(write_wrf_twin(time_texts=("2007-10-23_18:00:00", text)))
 
 
 def test_no_time_at_all_is_refused(write_wrf_twin):

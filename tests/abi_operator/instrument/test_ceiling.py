@@ -38,6 +38,7 @@ def test_hard_ceiling_and_its_derivative():
     value, derivative = both(RADIANCE)
     np.testing.assert_array_equal(value, np.minimum(RADIANCE, CEILING))
     np.testing.assert_array_equal(derivative, np.asarray(RADIANCE) < CEILING)
+    assert np.isnan(hard_ceiling(jnp.array(jnp.nan), CEILING))
 
 
 @pytest.mark.parametrize("width", [0.3, 0.03, 1e-3])

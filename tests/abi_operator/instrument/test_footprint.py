@@ -58,6 +58,21 @@ def test_a_footprint_without_cells_has_no_mean_and_no_derivative():
     np.testing.assert_allclose(gradient, 0.01, rtol=1e-14)
 
 
+def test_a_cell_without_a_value_spoils_the_pixels_that_see_it_and_no_other():
+    lengths = overlap_lengths(EDGES, PIXELS)
+    cells = jnp.ones((10, 10)).at[9, 0].set(jnp.nan)
+    mean = np.asarray(image_mean(cells, lengths, lengths))
+    expected = np.ones((4, 4))
+    expected[3, 0] = np.nan
+    np.testing.assert_allclose(mean, expected, rtol=1e-14)
+    both = jax.jit(jax.value_and_grad(footprint_mean, (0, 1)))
+    weights, radiance = jnp.array([1.0, 2.0, 0.0]), jnp.array([3.0, 6.0, jnp.nan])
+    value, gradient = both(radiance, weights)
+    assert value == 5
+    np.testing.assert_allclose(gradient[0], [1 / 3, 2 / 3, 0])
+    assert np.isnan(both(radiance, weights.at[2].set(1e-9))[0])
+
+
 @pytest.mark.float32
 def test_float32_stays():
     @jax.jit

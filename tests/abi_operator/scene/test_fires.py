@@ -116,6 +116,8 @@ def test_refusals(model):
         burning_columns(model, table((33.1, -117.0, 900.0, 2e8)), first_row=4)
     with pytest.raises(InputError, match="fires need the corners of the model's cells"):
         burning_columns(model.drop_vars("latitude_bounds"), here)
+    with pytest.raises(InputError, match="only a scene of two rows and columns or more"):
+        fires_inside(here, model.isel(x=slice(1)))
 
 
 @pytest.fixture

@@ -110,11 +110,24 @@ def test_counts_are_those_of_the_files(result):
     np.testing.assert_allclose(seen[0], counts)
 
 
+def test_a_column_without_light_stays_without(result):
+    """Where the ground has no albedo nothing was simulated; the imager tells nothing there."""
+    result["radiance"][:, 20, 20] = np.nan
+    seen = observed(result, IMAGER)
+    for name in ("radiance", "reflectance_factor", "brf"):
+        assert np.isnan(seen[name].values[:, 20, 20]).all(), name
+    assert np.isnan(seen["brightness_temperature"].values[20, 20])
+    assert not (seen["saturated"].values[:, 20, 20] == 1).any()
+    assert np.isfinite(seen["radiance"].values).sum() == 3 * (40 * 42 - 1)
+
+
 def test_a_pixel_sees_the_mean_before_anything_saturates(result):
+    result["radiance"][:, 20, 20] = np.nan  # of which one pixel sees something
     seen = observed(result, IMAGER, footprint=4)
     assert seen.sizes["y"] == 10 and seen.sizes["x"] == 10  # two columns fill no pixel
     blocks = result["radiance"].values[..., :40].reshape(3, 10, 4, 10, 4)
     np.testing.assert_allclose(seen["radiance"], blocks.mean(axis=(2, 4)))
+    assert np.isnan(seen["radiance"].values).sum() == 3
     assert not (seen["saturated"] == 1).any()
 
 
@@ -135,6 +148,7 @@ def test_pixels_have_means_of_all_else(result):
 def test_refusals(result):
     for wrong, options, message in (
         (result.drop_vars("radiance"), {}, "has no radiance"),
+        (result.drop_vars("solar_zenith_angle"), {}, "has no solar_zenith_angle"),
         (result, {"footprint": 0}, "a footprint is 1 to 40 columns wide here; got 0"),
         (result, {"footprint": 41}, "got 41"),
         (result, {"calibration": True}, "is drawn by a seed"),
