@@ -1,7 +1,8 @@
 """What is there: the specified state of one column.
 
 Every class is a frozen pytree of floating arrays. One column has the shapes written here; a batch
-of columns carries one more axis, leading, on every leaf. Layers and levels count from the top.
+of columns carries any number of leading axes, the same on every leaf, but that the fields of a
+ground may stay single numbers. Layers and levels count from the top.
 """
 
 from typing import Any

@@ -141,7 +141,17 @@ def brightness_temperature(
     Parameters
     ----------
     state, sun_distance, **settings
-        As in `radiance`.
+        As in `radiance`; the state has temperatures and a ground in C07.
+
+    Returns
+    -------
+    One number for each column, in the batch's shape, before any limit of the instrument; NaN where
+    the satellite is out of sight.
+
+    Raises
+    ------
+    ValueError
+        As `radiance`.
     """
     seen = radiance(state, ("C07",), sun_distance=sun_distance, **settings)
     return temperature_of(seen[..., 0], "C07", settings_of(settings).satellite)

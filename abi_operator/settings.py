@@ -7,7 +7,7 @@ from .optics import ALL_GASES
 
 NUM_STREAMS = 10
 """Streams of the solver where nothing is said: so many are within 0.5 % of 64 in 99 of 100 columns
-that scenes hold, with ice and without; 8 are within 0.8 % (`benchmarks/truth.py`)."""
+of all kinds that scenes hold; 8 are within 0.8 % (`benchmarks/truth.py`)."""
 
 
 def streams_of_attributes(attributes: Mapping[str, Any]) -> int:
@@ -28,7 +28,7 @@ class Settings(NamedTuple):
     num_streams, num_modes, num_doublings
         Accuracy and cost of the solver; see `solver.Settings`. With `num_doublings` None every
         layer is exact, but for derivatives inside `jax.jit` and loops, where optical depths cannot
-        be read: columns with a layer thicker than 1000 are NaN there.
+        be read: columns with a layer thicker than 1000 that is not opaque are NaN there.
     error_budget
         Relative error of the reflectance that may be made for speed on top of what the streams
         leave, such as 1e-3; see `solver.Settings`. None solves everything.

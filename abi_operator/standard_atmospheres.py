@@ -69,6 +69,11 @@ def standard_atmosphere(
     liquid, plumes, hydrometeors
         What else is in the column; None for nothing.
 
+    Returns
+    -------
+    Atmosphere
+        Of one column, with gases and temperatures.
+
     Raises
     ------
     ValueError

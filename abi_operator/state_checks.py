@@ -35,6 +35,11 @@ def check_state(state: State) -> None:
     where they are no longer those of air: pressure in hPa, heights in km, angles in degrees; and so
     is mass of particles without a number of them, which would be no cloud at all.
 
+    Parameters
+    ----------
+    state
+        A state whose leaves are arrays in memory.
+
     Raises
     ------
     ValueError

@@ -53,7 +53,8 @@ def smoke(
     Raises
     ------
     ValueError
-        Where a value is out of its range (`ranges.STATE`), unless it is traced.
+        Where a band is unknown, or optics are given outside `bands`; where a value is out of its
+        range (`ranges.STATE`), unless it is traced.
 
     References
     ----------
@@ -81,7 +82,7 @@ def ash(
 
     Optics are those of spheres with an effective radius of 3 um, near the mode that Prata and
     Grant [1]_ found, and a refractive index of 1.53 - 0.0015i, which makes the ash brown.
-    Parameters are those of `smoke`.
+    Parameters, and what is refused, are those of `smoke`.
 
     References
     ----------
@@ -128,7 +129,8 @@ def background_aerosol(
     Raises
     ------
     ValueError
-        Where a value is out of its range (`ranges.STATE`), unless it is traced.
+        Where a band is unknown, or optics are given outside `bands`; where a value is out of its
+        range (`ranges.STATE`), unless it is traced.
 
     References
     ----------
@@ -161,7 +163,8 @@ def mie_plume(
     Parameters
     ----------
     species
-        Name of a species that has a table (`mie_species`).
+        ``"smoke"``, ``"ash"`` or ``"dust"``: one that has a table (`mie_species`), whose refractive
+        indices `benchmarks/make_aerosol_tables.py` names with their sources.
     aod_550
         Optical depth at 550 nm where brightness is 1. [-]
     effective_radius_um
