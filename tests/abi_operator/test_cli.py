@@ -199,11 +199,11 @@ def test_blocks_of_rows_make_one_file_and_one_picture(invoke, tmp_path, inputs, 
 
 def test_variables_that_the_scene_does_not_have_leave_nothing_behind(invoke, tmp_path, inputs):
     options = ["--ocean-albedo", 0.03, "--bands", "C04", "--num-streams", 2, "--gases", "none"]
-    options += ["--error-budget", 0, "--variables", "brf,brightness_temperature"]
+    options += ["--error-budget", 0, "--variables", "brf,vapour"]
     options += ["--out", tmp_path / "out"]
     outcome = invoke("simulate", inputs.wrf, *options)
     assert outcome.exit_code == 2
-    assert "the result has no brightness_temperature; choose of brf, " in outcome.stderr
+    assert "the result has no vapour; choose of brf, " in outcome.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["inputs"]
 
 
