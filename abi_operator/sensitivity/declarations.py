@@ -10,6 +10,7 @@ from jaxtyping import Array
 
 from ..atmosphere import State
 from ..ranges import STATE
+from .ground_albedo import albedo
 from .inputs import Input, added, factor, leaf, part, several
 
 _DEGREE = np.pi / 180
@@ -58,6 +59,8 @@ def declared(name: str, species: str | None = None) -> Input:
         return factor(name, 0.01)
     quantity, _, band = name.rpartition("_")
     if quantity in BY_BAND and name not in SHORT_NAMES:
+        if quantity == "albedo":
+            return albedo(band)
         every = declared(quantity, species)
         place, step = _BY_BAND[quantity]
         place = f"{place.format(species=species)}.{band}"
@@ -72,13 +75,12 @@ def declared(name: str, species: str | None = None) -> Input:
     return _DECLARED[name](species or "")
 
 
-# Places of what is given by band, and steps. [-]
+# Places of what a plume has by band, and steps. [-]
 _BY_BAND = {
     "ssa": ("atmosphere.plumes.{species}.ssa", 0.01),
     "asymmetry": ("atmosphere.plumes.{species}.asymmetry", 0.02),
-    "albedo": ("albedo", 0.01),
 }
-BY_BAND = tuple(_BY_BAND)
+BY_BAND = (*_BY_BAND, "albedo")
 """Short names that take a band, too."""
 
 
@@ -119,7 +121,7 @@ _DECLARED: dict[str, Callable[[str], Input]] = {
     "ssa": _by_band("ssa", "single-scattering albedo of the {species} plume"),
     "asymmetry": _by_band("asymmetry", "asymmetry factor of the {species} plume"),
     "plume_height": _plume_height,
-    "albedo": _by_band("albedo", "albedo of the ground"),
+    "albedo": lambda _species: albedo(),
     "liquid_mass": _relative(
         "atmosphere.liquid.mass_path", 0.1, "liquid_mass", "relative change of cloud water"
     ),

@@ -4,7 +4,8 @@ A place is a path of fields and keys, such as ``"albedo.C03"`` or ``"atmosphere.
 it ends at a leaf or at a part of the state, all leaves of which are changed alike. `leaf` adds to
 them and `factor` multiplies them; what is no leaf (an optical depth) is an `Input` of its own, and
 `several` changes leaves at several places (the base and the top of a plume). Those that have short
-names are in `declarations`.
+names are in `declarations`. A ground that reflects unevenly has leaves that are no albedo: that of
+any ground is `ground_albedo.albedo`.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,5 +1,7 @@
 """What can be changed, by declaration."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,7 @@ from abi_operator.plume_edges import moves_plume_edges
 from abi_operator.sensitivity import declared, factor, leaf
 from abi_operator.sensitivity.declarations import BY_BAND, SHORT_NAMES
 from abi_operator.sensitivity.inputs import changed, part
+from abi_operator.surface import LandAndSea, RossLi, ocean
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +61,42 @@ def test_a_leaf_is_declared_by_its_place(states):
     assert declared("atmosphere.pressure").units == "1"
 
 
+@pytest.fixture(scope="module")
+def uneven(states):
+    """Grounds from land with kernels, the first of it dark, to a sea under wind, in two bands."""
+    land = RossLi(jnp.linspace(0.02, 0.3, 6), jnp.full(6, 0.05), jnp.full(6, 0.015))
+    share, wind = jnp.array([0, 0, 0.3, 0.6, 1, 1]), jnp.array([2.0, 3, 7, 5, 5, 12])
+    grounds = {x: LandAndSea(land, ocean(wind, x), share) for x in ("C02", "C03")}
+    # NumPy's arrays with an axis each, as of a scene's columns.
+    grounds = jax.tree.map(lambda x: np.broadcast_to(np.asarray(x), 6), grounds)
+    return replace(states, albedo=grounds)
+
+
+@jax.jit
+def of_sky(ground):
+    return jax.tree.map(jnp.asarray, ground).white_sky_albedo()
+
+
+@pytest.mark.parametrize("name, bands", [("albedo", ("C02", "C03")), ("albedo_C03", ("C03",))])
+def test_albedo_is_that_of_any_ground(uneven, name, bands):
+    """To all sides alike: kernels, wind and share of water stay, and what is added is exact."""
+    one = declared(name)
+    step = moved(uneven, one, one.step)
+    for band, ground in uneven.albedo.items():
+        rise = of_sky(step.albedo[band]) - of_sky(ground)
+        np.testing.assert_allclose(rise, one.step if band in bands else 0, atol=1e-14)
+        for path in ("land.f_vol", "land.f_geo", "sea.wind_speed", "water_share"):
+            ours, theirs = (part(x, f"albedo.{band}.{path}") for x in (step, uneven))
+            np.testing.assert_array_equal(ours, theirs)
+    # Foam's reflectance is rounded in the seventh place, and covers some hundredths of the sea.
+    own = np.mean([of_sky(uneven.albedo[band]) for band in bands], axis=0)
+    np.testing.assert_allclose(one.value(uneven), own, atol=1e-8)
+    np.testing.assert_allclose(one.value(step) - one.value(uneven), one.step, rtol=1e-9)
+    assert one.holds(uneven).all() and one.holds(step).all()
+    assert one.holds(moved(uneven, one, -one.step)).tolist() == [False] + 5 * [True]
+    assert not one.holds(moved(uneven, one, 1.0)).any()
+
+
 def test_what_there_is_not_is_told(states):
     with pytest.raises(ValueError, match="no input 'depth'; choose from aod_550, ssa"):
         declared("depth")
@@ -67,6 +106,8 @@ def test_what_there_is_not_is_told(states):
         declared("ssa_C03")
     with pytest.raises(ValueError, match="no atmosphere.plumes.dust.ssa: instead of 'dust' there"):
         declared("ssa", "dust").change(states, jnp.zeros(6))
+    with pytest.raises(ValueError, match="no albedo.C05: instead of 'C05' there is"):
+        declared("albedo_C05").change(states, jnp.zeros(6))
     with pytest.raises(ValueError, match="a step is above 0; got 0"):
         declared("albedo").stepping(0.0)
 
