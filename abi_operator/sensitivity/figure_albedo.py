@@ -3,7 +3,8 @@
 Grasso et al. (2013) brought MODIS albedo into their imagery since over a ground of one albedo every
 fire and every plume stands out as if there were no other ground. The same scene is simulated twice,
 with the albedo of each pixel and with the mean of the land in each band, and each time without its
-plume and with a fire in every pixel.
+plume and with a fire in every pixel. Land that reflects by kernels has the mean of its white-sky
+albedo, and reflects it to all sides alike.
 """
 
 from dataclasses import replace
@@ -17,17 +18,23 @@ from ..atmosphere import Fire, Plume, State
 from ..files import InputError
 from ..scene import species_of
 from .figure import Figure
+from .ground_albedo import white_sky_albedo
 from .outputs import output_function
 from .panels import change_map, histogram
+from .pixel_kinds import CLOUD, cloud_depth, depths_of, even_ground, ground_kinds
+from .result_checks import check_result, of_columns
 from .scene_study import chosen_pixels, settings_of_result, states_of, sun_distance_of
 
 _BANDS = ("C01", "C02", "C03", "C06")
 _FIRE = "fire_contrast"
-_CLOUD = 0.01  # optical depth in C06 from which a pixel is cloudy [-]
 
 
 def albedo_figure(image: xr.Dataset, fire: Fire) -> Figure:
     """Contrast of a plume and of fires over land, with MODIS and with constant albedo.
+
+    Land is what is known to be land (`pixel_kinds.ground_kinds`) and has an albedo that differs
+    between bands, as that of a map does: what was given one number (``--land-albedo``) has no
+    albedo by MODIS, and may not be told from water.
 
     Parameters
     ----------
@@ -39,8 +46,10 @@ def albedo_figure(image: xr.Dataset, fire: Fire) -> Figure:
     Raises
     ------
     InputError
-        Where there is no plume, a band is missing, or no land without cloud.
+        Where there is no plume, a band is missing or another part of the result, or no land
+        without cloud.
     """
+    check_result(image, [*depths_of(image), *of_columns(image)])
     there = species_of(image)
     lacking = sorted(set(_BANDS) - set(image["band"].values.tolist()))
     if lacking or len(there) != 1:
@@ -48,14 +57,17 @@ def albedo_figure(image: xr.Dataset, fire: Fire) -> Figure:
             "this figure is of one plume and of C01, C02, C03 and C06; the result has plumes of "
             f"{', '.join(there) or 'nothing'} and lacks {', '.join(lacking) or 'no band'}."
         )
-    albedo = image["surface_albedo"].sel(band=list(_BANDS)).transpose("band", "y", "x").values
-    land = chosen_pixels(image, None, "all") & (np.ptp(albedo, axis=0) > 1e-6)
-    land &= image["liquid_optical_depth"].sel(band="C06").values < _CLOUD
+    land = chosen_pixels(image, None, "all") & ground_kinds(image)["land"] & ~even_ground(image)
+    land &= cloud_depth(image, "C06") < CLOUD
     if not land.any():
-        raise InputError("there is no land without cloud that the sun shines on.")
+        raise InputError(
+            "there is no land without cloud that the sun shines on and whose albedo differs "
+            "between bands, as that of an albedo file does."
+        )
     with jax.enable_x64(True):
         states = states_of(image, land, (*_BANDS, _FIRE), fire)
-        mean = {band: np.full(land.sum(), x.mean()) for band, x in states.albedo.items()}
+        own = {band: np.asarray(white_sky_albedo(x)) for band, x in states.albedo.items()}
+        mean = {band: np.full(land.sum(), x.mean()) for band, x in own.items()}
         grounds = {"MODIS": states, "constant": replace(states, albedo=mean)}
         how = settings_of_result(image), sun_distance_of(image)
         found = {name: _contrasts(x, there[0], how) for name, x in grounds.items()}

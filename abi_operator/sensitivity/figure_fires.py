@@ -9,11 +9,12 @@ import xarray as xr
 
 from ..atmosphere import Fire
 from ..files import InputError
-from ..scene import SATELLITE_LONGITUDE
+from ..scene import SATELLITE_LONGITUDE, classes_of
 from ..scene.angles import find_angles
 from .figure import Figure
 from .outputs import FIRE_BAND, output_function
 from .panels import curves
+from .result_checks import check_result, of_columns
 from .scene_study import chosen_pixels, settings_of_result, states_of, sun_distance_of
 
 ALBEDOS = (0.05, 0.1, 0.2, 0.3, 0.5)
@@ -67,8 +68,9 @@ def fires_by_hour(image: xr.Dataset, fire: Fire) -> ByHour:
     Raises
     ------
     InputError
-        Where there is no C06, no time, or no such column.
+        Where there is no C06, no time, no such column, or another part of the result is missing.
     """
+    check_result(image, of_columns(image))
     if FIRE_BAND not in image["band"].values or "time" not in image.variables:
         raise InputError(f"this figure is of {FIRE_BAND} at a time, which the result lacks.")
     with jax.enable_x64(True):
@@ -138,7 +140,8 @@ def _clear_place(image: xr.Dataset) -> np.ndarray:
     for name in image.data_vars:
         if str(name).endswith("_brightness"):
             good &= ~(image[name].values > 0)
-    good &= ~(image["liquid_mass_path"].sum("layer").values > 0)
+    for name in ("liquid", *classes_of(image)):
+        good &= ~(image[f"{name}_mass_path"].sum("layer").values > 0)
     if not good.any():
         raise InputError("the result has no column without cloud and plume that the sun shines on.")
     y, x = np.indices(good.shape)

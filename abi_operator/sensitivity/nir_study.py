@@ -17,19 +17,19 @@ import xarray as xr
 from ..atmosphere import State
 from ..files import InputError
 from ..files.result import CONVENTIONS
-from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
-from ..scene import classes_of, column_states, gases_of, species_of
+from ..nomenclature import QUALITY_FLAGS
+from ..scene import column_states, gases_of, species_of
 from ..settings import Settings, streams_of_attributes
 from .green_change import NearInfrared, green_fields
+from .pixel_kinds import CLOUD, cloud_depth, depths_of
 from .place import with_place
 from .plume_band import PlumeBand
+from .result_checks import check_result, of_columns
 from .ssa_root import ssa_for_mean, ssa_of_each
 
 BAND = "C03"
 """The near infrared that green is derived from."""
 _COLOURS = ("C01", "C02", BAND)
-# Optical depth of cloud in C03 from which a pixel is not counted: less does not show. [-]
-_CLOUD = 0.01
 _DARK = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 
 
@@ -98,7 +98,7 @@ def _study(
     seen &= np.isfinite([brf[band] for band in _COLOURS]).all(axis=0)
     brightness = image[f"{species}_brightness"].values
     inside = (brightness > 0) & seen
-    counted = inside & (brightness >= smallest_brightness) & (_cloud_depth(image) < _CLOUD)
+    counted = inside & (brightness >= smallest_brightness) & (cloud_depth(image, BAND) < CLOUD)
     if not counted.any():
         raise InputError(
             f"no pixel is counted: none has {species} with a picture of {smallest_brightness:g} or "
@@ -152,28 +152,12 @@ def _columns(image: xr.Dataset, chosen: np.ndarray) -> State:
     return column_states(image.isel(y=y, x=x), (BAND,))
 
 
-def _cloud_depth(image: xr.Dataset) -> np.ndarray:
-    """Optical depth of all hydrometeors in C03 (y, x). [-]"""
-    names = [f"{name}_optical_depth" for name in ("liquid", *classes_of(image))]
-    return np.sum([image[name].sel(band=BAND).values for name in names], axis=0)
-
-
 def _check(image: xr.Dataset, species: str) -> None:
-    if "time" in image.dims:
-        raise InputError(f"one time at a time is changed; the result has {image.sizes['time']}.")
+    needed = ["reflectance_factor", *depths_of(image), *of_columns(image)]
+    check_result(image, needed, _COLOURS)
     if species not in species_of(image):
         plumes = ", ".join(species_of(image)) or "none"
         raise InputError(
             f"the result has no plume of {species} (plumes: {plumes}); simulate a scene with one "
             "(abi-operator demo --plume ash, or simulate --plume --plume-species ash)."
         )
-    needed = ["reflectance_factor", "liquid_optical_depth", *SCENARIO]
-    missing = [x for x in (*needed, *(f"{species}_{y}" for y in PLUME)) if x not in image.variables]
-    if missing:
-        raise InputError(
-            f"the result has no {', '.join(missing)}; keep all of it (abi-operator simulate "
-            "without --variables)."
-        )
-    lacking = sorted(set(_COLOURS) - set(image["band"].values.tolist()))
-    if lacking:
-        raise InputError(f"the result has no band {', '.join(lacking)}; simulate it.")

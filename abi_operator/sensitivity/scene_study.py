@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..atmosphere import Fire, State
 from ..files import InputError
-from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
+from ..nomenclature import QUALITY_FLAGS
 from ..plume_edges import moves_plume_edges
 from ..scene import column_states, gases_of, species_of
 from ..scene.angles import sun_distance
@@ -19,6 +19,7 @@ from .declarations import declared
 from .derivatives import Function, Sensitivity, sensitivity
 from .inputs import Input, changed
 from .outputs import FIRE_CONTRAST, bands_of, check_outputs, output_function
+from .result_checks import check_result, of_columns
 from .study_dataset import SampledPixels, study_dataset
 from .variance import covariance_of, sampled_variance
 
@@ -107,7 +108,7 @@ def sensitivity_study(
     try:
         of = check_outputs(of)
         species = _species(image, species)
-        _check(image, of, species)
+        check_result(image, of_columns(image), bands_of(of))
         inputs = [_input(one, species, sigma or {}) for one in to]
         unknown = sorted(set(sigma or {}) - {one.name for one in inputs})
         if unknown:
@@ -165,30 +166,15 @@ def _species(image: xr.Dataset, species: str | None) -> str | None:
     return species if species is not None else next(iter(there), None)
 
 
-def _check(image: xr.Dataset, of: Sequence[str], species: str | None) -> None:
-    if "time" in image.dims:
-        raise ValueError(f"one time at a time is looked at; the result has {image.sizes['time']}.")
-    plume = [] if species is None else [f"{species}_{name}" for name in PLUME]
-    missing = [name for name in (*SCENARIO, *plume) if name not in image.variables]
-    if missing:
-        raise ValueError(
-            f"the result has no {', '.join(missing)}; keep all of it (abi-operator simulate "
-            "without --variables)."
-        )
-    lacking = sorted(set(bands_of(of)) - set(image["band"].values.tolist()))
-    if lacking:
-        raise ValueError(f"the result has no band {', '.join(lacking)}; simulate it.")
-
-
 def chosen_pixels(image: xr.Dataset, species: str | None, where: str) -> np.ndarray:
-    """Pixels that are looked at (y, x)."""
+    """Pixels that are looked at (y, x); an `InputError` where there is none."""
     if where not in ("plume", "all"):
-        raise ValueError(f"pixels are those of 'plume' or 'all'; got {where!r}.")
+        raise InputError(f"pixels are those of 'plume' or 'all'; got {where!r}.")
     chosen = (image["quality_flag"].values & _DARK) == 0
     if where == "plume" and species is not None:
         chosen &= image[f"{species}_brightness"].values > 0
     if not chosen.any():
-        raise ValueError("there is no pixel to look at: the sun shines on none of those chosen.")
+        raise InputError("there is no pixel to look at: the sun shines on none of those chosen.")
     return chosen
 
 

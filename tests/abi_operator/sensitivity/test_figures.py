@@ -1,19 +1,69 @@
 """The paper's arguments on a scene."""
 
+import importlib
+
 import numpy as np
 import pytest
+import xarray as xr
 from PIL import Image
 from typer.testing import CliRunner
 
 from abi_operator import Fire, cli
 from abi_operator.files import InputError
+from abi_operator.files.stored import stored
+from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.products import derived_green
 from abi_operator.sensitivity import albedo_figure, fires_by_hour, fires_figure, green_figure
-from abi_operator.sensitivity.figure_fires import ALBEDOS, SHOWS, TEMPERATURES
+from abi_operator.sensitivity.figure_fires import ALBEDOS, SHOWS, TEMPERATURES, _clear_place
 from abi_operator.sensitivity.nir_study import brf_by_band
 from abi_operator.sensitivity.panels import curves, scatter
 
 FIRE = Fire(0.04, 800.0)
+figure_albedo = importlib.import_module("abi_operator.sensitivity.figure_albedo")
+
+
+def kinds_of(image):
+    """How many pixels are of which kind."""
+    lines = [x.split() for x in green_figure(image).lines if "grasso2013" in x]
+    return {" ".join(x[1:-3]): int(x[-1]) for x in lines}
+
+
+def land_of(image):
+    """Pixels (y, x) whose ground, simulated with 0.03 over water, is land."""
+    return image["surface_albedo"].isel(band=0, drop=True) != np.float32(0.03)
+
+
+def snowing(image, where):
+    """The same with snow in the air of some pixels, and no more of cloud water."""
+    path, depth = (xr.zeros_like(image[f"liquid_{x}"]) for x in ("mass_path", "optical_depth"))
+    return image.assign(
+        snow_mass_path=path + 0.1 * where,
+        snow_number_path=path + 1e6 * where,
+        snow_optical_depth=depth + 0.5 * where,
+    )
+
+
+@pytest.fixture
+def grounds_drawn(monkeypatch):
+    """A function from a result to the grounds of the figure of albedo, for which nothing is solved.
+
+    By band and name, of land in the order of its pixels.
+    """
+    seen = []
+
+    def contrasts(states, *_):
+        seen.append(states.albedo)
+        return np.ones((len(states.geometry.solar_zenith), 5))
+
+    def drawn(image):
+        seen.clear()
+        figure = albedo_figure(image, FIRE)
+        land = np.isfinite(figure.fields["fire_contrast_MODIS"])
+        return land, dict(zip(("MODIS", "constant"), seen, strict=True))
+
+    monkeypatch.setattr(figure_albedo, "_contrasts", contrasts)
+    monkeypatch.setattr("abi_operator.scene.grounds.sea_albedo", lambda _, wind: 0.05 + 0 * wind)
+    return drawn
 
 
 def test_the_command_draws_green(result_file, image, tmp_path, monkeypatch):
@@ -35,9 +85,77 @@ def test_the_command_draws_green(result_file, image, tmp_path, monkeypatch):
 
 
 def test_kinds_of_pixels_are_all_of_them(image):
-    lines = [x.split() for x in green_figure(image).lines if "grasso2013" in x]
-    counts = [int(x[-1]) for x in lines]
-    assert counts[0] == sum(counts[1:]) == image.sizes["y"] * image.sizes["x"]
+    kinds = kinds_of(image)
+    assert list(kinds)[1:3] == ["clear water", "clear land"]
+    assert kinds["all"] == sum(kinds.values()) / 2 == image.sizes["y"] * image.sizes["x"]
+
+
+def test_water_is_told_in_sunlight_and_by_its_share(image):
+    """In C07 each ground has its own emissivity, and a sea under wind its albedo by band."""
+    kinds, albedo, land = kinds_of(image), image["surface_albedo"], land_of(image)
+    shines = image.reindex(band=[*image["band"].values, "C07"], fill_value=0.02)
+    assert kinds_of(shines) == kinds
+    rough = albedo.where(land, albedo + xr.DataArray(0.01 * np.arange(5), dims="band"))
+    share = xr.where(land, 0.0, 1.0)
+    windy = image.assign(surface_albedo=rough, water_share=share, wind_speed=5 + 0 * share)
+    assert kinds_of(windy) == kinds
+    # Land of one albedo is land, where that is known, and so is a sea most of which is ice.
+    assert kinds_of(windy.assign(surface_albedo=xr.full_like(albedo, 0.2))) == kinds
+    frozen = kinds_of(windy.assign(water_share=0.3 * share))
+    assert "clear water" not in frozen
+    assert frozen["clear land"] == kinds["clear water"] + kinds["clear land"]
+
+
+def test_land_that_may_be_water_is_not_called_either(image):
+    """By a second albedo that is one in all bands, or where the result says that it was filled."""
+    kinds, land = kinds_of(image), land_of(image)
+    filled = image.assign_attrs(last_resort_albedo_count=1)
+    grey = image.assign(surface_albedo=image["surface_albedo"].where(~land, 0.2))
+    for some, moved in ((filled, 0), (grey, kinds["clear land"])):
+        found = kinds_of(some)
+        assert "clear water" not in found and "plume over water" not in found
+        assert found["clear water or land"] == kinds["clear water"] + moved
+        assert any("it may be water or land" in line for line in green_figure(some).lines)
+    assert not any("it may be" in line for line in green_figure(image).lines)
+
+
+def test_snow_in_the_air_is_cloud(image, grounds_drawn):
+    kinds = kinds_of(image)
+    clear = (image["liquid_optical_depth"].sel(band="C03") < 0.01) & land_of(image)
+    clear &= image["ash_brightness"] == 0
+    some = snowing(image, clear)
+    found = kinds_of(some)
+    assert "clear land" not in found and found["cloud"] == kinds["cloud"] + kinds["clear land"]
+    land, _ = grounds_drawn(image)
+    assert kinds_of(stored(some, ("image",))) == found
+    without, _ = grounds_drawn(some)
+    assert (without == land & ~clear.values).all()
+    place = _clear_place(image)
+    other = _clear_place(snowing(image, xr.DataArray(place, dims=("y", "x"))))
+    assert place.sum() == other.sum() == 1 and not (place & other).any()
+
+
+def test_constant_albedo_is_the_mean_of_what_land_reflects(image, grounds_drawn):
+    """Over land alone, and to all sides, also where land reflects by kernels and water by wind."""
+    land, plain = grounds_drawn(image)
+    albedo, share = image["surface_albedo"], xr.where(land_of(image), 0.0, 1.0)
+    kernels = {
+        f"{name}_kernel_weight": (0.2 * albedo).where(share == 0, 0.0)
+        for name in ("volume", "geometric")
+    }
+    by_band = xr.DataArray(0.01 * np.arange(5), dims="band")
+    sea = {"water_share": share, "wind_speed": 5 + 0 * share}
+    rough = image.assign(surface_albedo=albedo + by_band * share, **kernels, **sea)
+    same, uneven = grounds_drawn(rough)
+    assert (same == land).all()
+    for band, mean in plain["constant"].items():
+        own = albedo.sel(band=band).values[land].astype(np.float64)
+        np.testing.assert_allclose(mean, own.mean(), rtol=1e-12)
+        np.testing.assert_allclose(uneven["constant"][band], mean, rtol=1e-12)
+        assert uneven["MODIS"][band].land.f_vol.max() > 0.01
+    grey = image.assign(surface_albedo=xr.full_like(albedo, 0.2))
+    with pytest.raises(InputError, match="whose albedo differs between bands"):
+        grounds_drawn(grey)
 
 
 def test_panels_of_lines_and_of_pairs():
@@ -95,3 +213,17 @@ def test_what_a_figure_lacks_is_told(image):
         fires_figure(some, FIRE)
     with pytest.raises(InputError, match="lacks C06"):
         albedo_figure(some, FIRE)
+
+
+@pytest.mark.parametrize("figure", [green_figure, albedo_figure, fires_figure])
+def test_no_figure_is_of_the_night_or_of_half_a_result(image, figure):
+    how = () if figure is green_figure else (FIRE,)
+    night = image.assign(quality_flag=image["quality_flag"] | QUALITY_FLAGS["night"])
+    with pytest.raises(InputError, match="the sun shines on none of those chosen"):
+        figure(night, *how)
+    half = stored(image, ("image",)) if how else image.drop_vars("surface_albedo")
+    missing = "pressure, height, liquid_mass_path" if how else "surface_albedo; keep"
+    with pytest.raises(InputError, match=f"the result has no {missing}"):
+        figure(half, *how)
+    with pytest.raises(InputError, match="one time at a time"):
+        figure(image.expand_dims("time"), *how)
