@@ -182,7 +182,7 @@ def retrieved_fields(
         retrieved = retrieve_pixels(
             forward, observations, states, prior=of_x, minimiser=minimiser, exact=exact
         )
-    fields = pixel_fields(vector, retrieved, states, observations.num_values)
+    fields = pixel_fields(vector, forward.bands, retrieved, states, observations.num_values)
     if diagnostics:
         x = np.asarray(retrieved.inversion.x)
         found = estimates(forward, observations, states, x, of_x, assumed)

@@ -1,6 +1,6 @@
 """Retrievals of single pixels as an image: a Dataset with CF attributes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -31,7 +31,11 @@ class Field(NamedTuple):
 
 
 def pixel_fields(
-    vector: StateVector, retrieved: Retrieved, states: State, num_values: np.ndarray
+    vector: StateVector,
+    bands: Sequence[str],
+    retrieved: Retrieved,
+    states: State,
+    num_values: np.ndarray,
 ) -> dict[str, Field]:
     """Physical quantities of the pixels retrieved.
 
@@ -39,6 +43,8 @@ def pixel_fields(
     ----------
     vector
         Meaning of x.
+    bands
+        Names of the bands, in the order in which a product has them.
     retrieved
         Solutions.
     states
@@ -69,7 +75,8 @@ def pixel_fields(
             ):
                 found = reported[name]
                 if isinstance(found, dict):
-                    by_band = np.stack(list(found.values()))
+                    # JAX hands a dictionary back with its keys sorted, not in the product's order.
+                    by_band = np.stack([found[band] for band in bands])
                     fields[name] = Field(by_band, item.units, words, ("band",))
                 else:
                     fields[name] = Field(np.asarray(found), item.units, words)

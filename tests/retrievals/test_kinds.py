@@ -7,6 +7,7 @@ import xarray as xr
 from abi_operator.files import InputError
 from abi_operator.nomenclature import QUALITY_FLAGS
 from retrievals import ResultCode, retrieve_smoke
+from retrievals.kinds import BANDS
 
 DARK, BRIGHT, CLOUDY = 0, 1, 2  # rows of a scene
 
@@ -44,7 +45,9 @@ def test_single_scattering_albedo_is_recovered_with_it(make_result):
     simulated = make_result(aod_550=(0.9, 2.0), ssa_shift=0.35)
     truth = simulated["smoke_ssa"].copy()
     known = simulated.assign(smoke_ssa=("band", shifted(truth.values, -0.35)))
-    retrieval = retrieve_smoke(known, retrieve_ssa=True)
+    # Bands are told apart by their names, in whichever order they are asked for.
+    retrieval = retrieve_smoke(known, retrieve_ssa=True, bands=BANDS[::-1])
+    assert retrieval["band"].values.tolist() == list(BANDS[::-1])
     success = retrieval["result_code"] == ResultCode.SUCCESS
     assert success[DARK].all()
     assert errors(simulated, retrieval).max() < RECOVERED
