@@ -33,7 +33,6 @@ from abi_operator.machine.speed import Kept
 from abi_operator.nomenclature import QUALITY_FLAGS, SCENARIO
 from abi_operator.radiance import FIRE_BANDS
 from abi_operator.scene import column_states
-from abi_operator.scene.angles import sun_distance
 from abi_operator.settings import streams_of_attributes
 
 from .chunks import map_chunks
@@ -52,8 +51,9 @@ from .observation import (
     UNUSABLE,
     Observation,
     add_noise,
-    beyond_the_ceiling,
+    distance_of,
     imager_of,
+    known_saturated,
     measurement,
 )
 from .prior import Prior
@@ -129,10 +129,12 @@ def retrieve_fires(
         forward = forward_model(dataset, vector, bands, num_streams)
         imager = imager_of(dataset)
         images = images_of(dataset)
-        measured = _measured(images, bands, imager)
+        measured, limited = _measured(images, bands, imager)
         if noise:
-            measured = add_noise(measured, seed, imager)
-        measured = measured.transpose("image", "band", "y", "x").values
+            measured = add_noise(measured, seed, imager, limited)
+        measured, limited = (
+            each.transpose("image", "band", "y", "x").values for each in (measured, limited)
+        )
         around = [
             _surroundings(image, values, bands, imager, threshold)
             for image, values in zip(images, measured, strict=True)
@@ -146,8 +148,8 @@ def retrieve_fires(
         attempted = codes == ResultCode.SUCCESS
         fields = {}
         if attempted.any():
-            rows = zip(images, measured, around, attempted, strict=True)
-            parts = [_gathered(forward, imager, *row, background) for row in rows if row[3].any()]
+            rows = zip(images, measured, limited, around, attempted, strict=True)
+            parts = [_gathered(forward, imager, *row, background) for row in rows if row[-1].any()]
             observations, states = jax.tree.map(lambda *x: np.concatenate(x), *parts)
             exact = not noise and prior is None and background == "stored"
             fields, codes[attempted] = retrieved_fields(
@@ -195,25 +197,31 @@ def _check(dataset: xr.Dataset, bands: tuple[str, ...], num_unknowns: int, prior
         )
 
 
-def _distance(image: xr.Dataset) -> float:
-    """Distance of the sun at the time of an image, as it was simulated. [AU]"""
-    return sun_distance(image["time"].values) if "time" in image.variables else 1.0
-
-
-def _measured(images: Sequence[xr.Dataset], bands: tuple[str, ...], imager: Imager) -> xr.DataArray:
-    """Reflectance factor, or radiance in C07, of all the light that arrives."""
-    parts = []
+def _measured(
+    images: Sequence[xr.Dataset], bands: tuple[str, ...], imager: Imager
+) -> tuple[xr.DataArray, xr.DataArray]:
+    """Reflectance factor, or radiance in C07, of all the light that arrives; and where a result
+    says that it is saturated.
+    """
+    dims, parts, limited = ("band", "y", "x"), [], []
     for image in images:
-        distance = _distance(image)
-        seen = beyond_the_ceiling(image["radiance"], image).sel(band=list(bands))
-        values = seen.transpose("band", "y", "x").values.astype(np.float64)
+        distance = distance_of(image)
+        seen = image["radiance"].sel(band=list(bands)).transpose(*dims)
+        values = seen.values.astype(np.float64)
         for i, band in enumerate(bands):
             if band != THERMAL:
                 values[i] = reflectance_factor_from_radiance(
                     jnp.asarray(values[i]), band, imager.satellite, distance
                 )
         parts.append(values)
-    return xr.DataArray(np.stack(parts), {"band": list(bands)}, ("image", "band", "y", "x"))
+        known = known_saturated(image)
+        known = xr.zeros_like(seen, bool) if known is None else known.sel(band=list(bands))
+        limited.append(known.transpose(*dims).values)
+    measured, saturated = (
+        xr.DataArray(np.stack(each), {"band": list(bands)}, ("image", *dims))
+        for each in (parts, limited)
+    )
+    return measured, saturated
 
 
 def _surroundings(
@@ -248,6 +256,7 @@ def _gathered(
     imager: Imager,
     image: xr.Dataset,
     measured: np.ndarray,
+    limited: np.ndarray,
     around: Surroundings,
     chosen: np.ndarray,
     background: Background,
@@ -256,8 +265,14 @@ def _gathered(
     y, x = np.nonzero(chosen)
     columns = image.isel(y=xr.DataArray(y, dims="column"), x=xr.DataArray(x, dims="column"))
     states = with_fire(column_states(columns, forward.bands), 0.0)
-    distance = np.full(len(y), _distance(image))
-    observed = measurement(measured[:, y, x].T, forward.bands, imager, sun_distance=distance)
+    distance = np.full(len(y), distance_of(image))
+    observed = measurement(
+        measured[:, y, x].T,
+        forward.bands,
+        imager,
+        sun_distance=distance,
+        saturated=limited[:, y, x].T,
+    )
     if background == "stored":
         return observed, states
     enough = prepared(forward, states)

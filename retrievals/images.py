@@ -1,6 +1,7 @@
 """Retrievals from the result of a simulation: a Dataset in, a Dataset out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import jax
@@ -18,7 +19,14 @@ from abi_operator.settings import streams_of_attributes
 from .forward import ForwardModel, prepared
 from .intervals import posterior_intervals
 from .inverse import DEFAULT_MINIMISER, Minimiser
-from .observation import Observation, add_noise, observe, usable
+from .observation import (
+    Observation,
+    add_noise,
+    imager_of,
+    known_saturated,
+    observe,
+    usable,
+)
 from .optimal_estimation import estimates
 from .pixels import retrieve_pixels
 from .prior import Prior
@@ -119,7 +127,8 @@ def retrieve_image(
         num_streams = streams_of_attributes(dataset.attrs)
     with jax.enable_x64(True):
         if noise:
-            noisy = add_noise(dataset["reflectance_factor"], seed)
+            factor, limited = dataset["reflectance_factor"], known_saturated(dataset)
+            noisy = add_noise(factor, seed, imager_of(dataset), limited)
             dataset = dataset.assign(reflectance_factor=noisy)
         images = images_of(dataset)
         codes = np.stack([usable(image, bands, species, where) for image in images])
@@ -274,5 +283,8 @@ def _gather(
         if chosen.any():
             y, x = (xr.DataArray(index, dims="column") for index in np.nonzero(chosen))
             columns = image.isel(y=y, x=x)
-            parts.append((observe(columns, bands), column_states(columns, bands)))
+            # Where something burns the bands that it shines in are missing; elsewhere a scene's
+            # reflectances are those of sunlight alone.
+            states = replace(column_states(columns, bands), fire=None)
+            parts.append((observe(columns, bands), states))
     return jax.tree.map(lambda *arrays: np.concatenate(arrays), *parts)

@@ -1,6 +1,7 @@
 """What the imager measured at each pixel, how well, and where that can be used."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import equinox as eqx
@@ -21,6 +22,7 @@ from abi_operator.instrument import (
 )
 from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.radiance import FIRE_BANDS
+from abi_operator.scene.angles import sun_distance
 
 from .forward import THERMAL, ForwardModel
 from .results import ResultCode
@@ -32,7 +34,6 @@ _ATTEMPTED = ResultCode.SUCCESS
 # Flags of pixels that are not attempted. Optics beyond what they were fitted to are no reason: the
 # retrieval's operator has the same.
 UNUSABLE = sum(bit for name, bit in QUALITY_FLAGS.items() if name != "outside_fit")
-_ROUNDING = 1e-6  # of single precision, and more
 # How far a saturated band may be exceeded before its likelihood no longer changes, in sigma. [-]
 _ENOUGH = 6.0
 
@@ -143,6 +144,11 @@ def noise_sigma(measured: ArrayLike, band: str, imager: Imager = IMAGER) -> np.n
         Reflectance factor, or in C07 radiance; below 0 the noise is that of a dark scene.
     band, imager
         Name of the band, and the instrument, whose noise is `abi_operator.instrument.Noise`.
+
+    Returns
+    -------
+    numpy.ndarray
+        In the unit of `measured`, of the same shape.
     """
     dark = jnp.maximum(jnp.asarray(measured, float), 0)
     satellite = imager.satellite
@@ -172,14 +178,16 @@ def measurement(
     calibration: bool = False,
     forward_error: float | Float[np.ndarray, "band band"] = 0.0,
     sun_distance: Float[ArrayLike, "*batch"] | None = None,
+    saturated: Bool[ArrayLike, "*batch band"] | None = None,
 ) -> Observation:
     """An observation with the noise and the ceilings of the instrument.
 
     Parameters
     ----------
     measured
-        Reflectance factors, and the radiance of C07, in the order of `bands`. What is at a band's
-        ceiling or above becomes the ceiling, and is saturated.
+        Reflectance factors, not per cent, which nobody notices before `retrieve_pixels`, and the
+        radiance of C07, in the order of `bands`. What is at a band's ceiling or above becomes the
+        ceiling, and is saturated.
     bands, imager
         Names of the bands, and the instrument.
     calibration
@@ -190,6 +198,16 @@ def measurement(
         the relative covariance of that, band by band, which makes errors of bands correlated. [-]
     sun_distance
         Distance of the sun, None for 1. [AU]
+    saturated
+        Which measurements are known to be saturated, whatever their size: each is its own lower
+        bound, as counts and rounding may have taken it below the ceiling. None for those at the
+        ceiling or above alone.
+
+    Returns
+    -------
+    Observation
+        The measurements in the type of JAX's floats, NaN where they were, with the standard
+        deviations of their errors, and with the errors' correlation if `forward_error` is a matrix.
     """
     values = np.asarray(measured, np.result_type(float))
     relative = np.zeros(len(bands))
@@ -201,23 +219,39 @@ def measurement(
         distance = np.broadcast_to(np.asarray(sun_distance, values.dtype), values.shape[:-1])
         reflective = np.array([band != THERMAL for band in bands])
         tops = np.where(reflective, tops * distance[..., None] ** 2, tops)
-    saturated = values >= tops
-    values = np.where(saturated, tops, values)
+    known = np.broadcast_to(False if saturated is None else np.asarray(saturated), values.shape)
+    limited = known | (values >= tops)
+    values = np.where(limited & ~known, tops, values)
     columns = [noise_sigma(values[..., i], band, imager) for i, band in enumerate(bands)]
     noise = np.stack(columns, axis=-1)
     if np.ndim(forward_error) == 0:
         other = np.hypot(relative, forward_error).astype(values.dtype) * values
-        return Observation(values, np.hypot(noise, other), saturated, distance)
+        return Observation(values, np.hypot(noise, other), limited, distance)
     covariance = values[..., :, None] * np.asarray(forward_error) * values[..., None, :]
     covariance += (noise**2 + (relative * values) ** 2)[..., None] * np.eye(len(bands))
     sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)).astype(values.dtype)
     correlation = (covariance / (sigma[..., :, None] * sigma[..., None, :])).astype(values.dtype)
-    return Observation(values, sigma, saturated, distance, correlation)
+    return Observation(values, sigma, limited, distance, correlation)
 
 
-def add_noise(reflectance_factor: xr.DataArray, seed: int, imager: Imager = IMAGER) -> xr.DataArray:
-    """Add the instrument's noise, Gaussian, independent between pixels and bands."""
-    noisy = reflectance_factor.copy(deep=True)
+def add_noise(
+    measured: xr.DataArray,
+    seed: int,
+    imager: Imager = IMAGER,
+    saturated: xr.DataArray | None = None,
+) -> xr.DataArray:
+    """Add the instrument's noise, Gaussian, independent between pixels and bands.
+
+    Parameters
+    ----------
+    measured
+        Reflectance factor, or radiance in C07, with a dimension ``band``. [-], [W m-2 sr-1 um-1]
+    seed, imager
+        Of the noise, and whose it is.
+    saturated
+        What is saturated (`known_saturated`), and stays as it is: no noise changes a ceiling.
+    """
+    noisy = measured.copy(deep=True)
     for band in noisy["band"].values:
         if band == "green":  # which the instrument lacks
             continue
@@ -225,7 +259,7 @@ def add_noise(reflectance_factor: xr.DataArray, seed: int, imager: Imager = IMAG
         own = np.random.default_rng([seed, list(BANDS).index(str(band))])
         values = values + noise_sigma(values, str(band), imager) * own.standard_normal(values.shape)
         noisy.loc[{"band": band}] = values
-    return noisy
+    return noisy if saturated is None else noisy.where(~saturated, measured)
 
 
 def imager_of(dataset: xr.Dataset) -> Imager:
@@ -237,20 +271,23 @@ def imager_of(dataset: xr.Dataset) -> Imager:
     )
 
 
-def beyond_the_ceiling(measured: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
-    """Measurements of which those that are saturated, as a result says that was observed, are a
-    little above the ceiling, below which rounding in the file may have taken them.
-    """
-    if "saturated" not in dataset:
-        return measured
-    return measured.where(dataset["saturated"] == 0, measured * (1 + _ROUNDING))
+def distance_of(image: xr.Dataset) -> float:
+    """Distance of the sun at the time of an image, as it was simulated; 1 without a time. [AU]"""
+    return sun_distance(image["time"].values) if "time" in image.variables else 1.0
 
 
-def observe(columns: xr.Dataset, bands: tuple[str, ...], imager: Imager = IMAGER) -> Observation:
-    """Take the measurement vectors of a Dataset with a dimension ``column``.
+def known_saturated(dataset: xr.Dataset) -> xr.DataArray | None:
+    """Which measurements are saturated, as a result says that was observed; None if none was."""
+    return dataset["saturated"] == 1 if "saturated" in dataset else None
 
-    Bands in which a fire of the scenario shines are missing: it is not part of the forward models
-    of reflectances.
+
+def observe(columns: xr.Dataset, bands: tuple[str, ...]) -> Observation:
+    """Take the measurement vectors of a Dataset of one time with a dimension ``column``.
+
+    The instrument is that of the Dataset (`imager_of`). Bands in which a fire of the scenario
+    shines are missing: it is not part of the forward models of reflectances. Ceilings are those of
+    the sun's distance, which the observation does not have unless there is C07 in it: reflected
+    light alone does not tell.
     """
     measured = columns["reflectance_factor"].sel(band=list(bands))
     if THERMAL in bands:
@@ -259,9 +296,13 @@ def observe(columns: xr.Dataset, bands: tuple[str, ...], imager: Imager = IMAGER
     if "fire_fraction" in columns:
         shines = measured["band"].isin(FIRE_BANDS) & (columns["fire_fraction"] > 0)
         measured = measured.where(~shines)
-    measured = beyond_the_ceiling(measured, columns)
+    limited = known_saturated(columns)
+    if limited is not None:
+        limited = limited.sel(band=list(bands)).transpose("column", "band").values
     values = measured.transpose("column", "band").values.astype(np.float64)
-    return measurement(values, bands, imager)
+    distance = np.full(len(values), distance_of(columns))
+    found = measurement(values, bands, imager_of(columns), sun_distance=distance, saturated=limited)
+    return found if THERMAL in bands else replace(found, sun_distance=None)
 
 
 def usable(

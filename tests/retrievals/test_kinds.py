@@ -85,6 +85,15 @@ def test_times_and_refusals_keep_their_places(simulated):
     assert errors(both, retrieval).max() < RECOVERED
 
 
+def test_of_fires_a_scene_reflects_nothing(simulated, retrieval):
+    """A result with fires elsewhere is that of sunlight, as it was simulated: without their heat,
+    and the ground's."""
+    calm = xr.zeros_like(simulated["smoke_brightness"])
+    beside = simulated.assign(fire_fraction=calm, fire_temperature=calm + 700.0)
+    found = retrieve_smoke(beside)
+    np.testing.assert_array_equal(found["aod_550"], retrieval["aod_550"])
+
+
 def test_nothing_to_attempt_is_a_product_too(simulated):
     clear = simulated.assign(smoke_brightness=xr.zeros_like(simulated["smoke_brightness"]))
     retrieval = retrieve_smoke(clear)

@@ -16,6 +16,7 @@ from retrievals.observation import (
     ceiling,
     measurement,
     noise_sigma,
+    observe,
     usable,
 )
 from retrievals.results import ResultCode
@@ -68,6 +69,48 @@ def test_ceilings_are_those_of_the_instrument():
     np.testing.assert_array_equal(found.saturated, [[False, True, True], [False] * 3])
     np.testing.assert_allclose(found.measured[0, 2], ceiling("C07", imager))
     np.testing.assert_array_equal(found.num_values, [1, 3])
+
+
+def test_what_was_reported_saturated_is_its_own_bound():
+    """Counts round a ceiling down, and rounding in files does: by its size it would be a value."""
+    imager = Imager(fire_saturation_temperature=400.0, quantised=True)
+    seen = observe_mean(jnp.asarray(50.0), "C07", imager)
+    assert seen.saturated and seen.radiance < ceiling("C07", imager)
+    values = np.array([[0.3, float(seen.radiance)], [1.3, np.nan]])
+    flags = np.array([[False, True], [False, False]])
+    found = measurement(values, ("C05", "C07"), imager, saturated=flags)
+    np.testing.assert_array_equal(found.saturated, [[False, True], [True, False]])
+    np.testing.assert_array_equal(found.measured[:, 1], values[:, 1])
+    np.testing.assert_allclose(found.measured[1, 0], ceiling("C05", imager))
+    np.testing.assert_array_equal(found.num_values, [1, 0])
+
+
+def test_an_image_has_the_ceilings_of_its_satellite_and_its_sun():
+    """At aphelion a ceiling is the reflectance factor of a weaker sun, which has to be as high."""
+    bands, dims = ("C02", "C06"), ("band", "column")
+    top = ceiling("C02", Imager("GOES-18"))
+    factor = [[1.02 * top, 1.04 * top, 0.5], [0.2, 0.2, 0.2]]
+    columns = xr.Dataset(
+        {"reflectance_factor": (dims, factor)},
+        {"band": list(bands), "time": np.datetime64("2019-07-04T22:00", "ns")},
+        {"satellite": "GOES-18"},
+    )
+    found = observe(columns, bands)
+    np.testing.assert_array_equal(found.saturated, [[False] * 2, [True, False], [False] * 2])
+    np.testing.assert_allclose(found.measured[1, 0], 1.0167**2 * top, rtol=1e-4)  # [AU]
+    assert found.sun_distance is None  # which reflected light does not tell
+    reported = columns.assign(saturated=(dims, np.array([[0, 0, 1], [0, 0, 0]], np.int8)))
+    found = observe(reported, bands)
+    np.testing.assert_array_equal(found.saturated[:, 0], [False, True, True])
+    assert found.measured[2, 0] == 0.5
+
+
+def test_no_noise_changes_what_is_saturated():
+    clean = xr.DataArray(np.full((2, 9), 0.3), {"band": ["C01", "C02"]}, ("band", "x"))
+    limited = clean.copy(data=np.arange(18).reshape(2, 9) % 2 == 0)
+    noisy = add_noise(clean, 3, saturated=limited)
+    np.testing.assert_array_equal(noisy == clean, limited)
+    np.testing.assert_array_equal(noisy.where(~limited), add_noise(clean, 3).where(~limited))
 
 
 def test_calibration_and_forward_error_add_in_squares():
