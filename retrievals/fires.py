@@ -12,7 +12,8 @@ of its error; modelled is no more than what the fire adds. The shift of the meas
 
 .. math:: L' = L - \\bar L + F(p = 0), \\qquad \\sigma'^2 = \\sigma_\\epsilon^2 + s^2
 
-does so with the same forward model F, in which the fire has no share p.
+does so with the same forward model F, in which the fire has no share p. Of the ground's temperature
+and albedo the result then has errors only as far as they change what the fire adds.
 """
 
 from collections.abc import Sequence
@@ -160,6 +161,7 @@ def retrieve_fires(
                 minimiser=minimiser,
                 exact=exact and solved_whole(dataset),
                 diagnostics=diagnostics,
+                excess=background == "neighbours",
                 assumed=assumed_of_fire(bands) if assumed is None else assumed,
             )
     about = how_made(bands, num_streams, noise, seed, prior) | {

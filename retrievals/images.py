@@ -165,6 +165,7 @@ def retrieved_fields(
     diagnostics: bool,
     assumed: StateVector | None,
     smooth: Smoothness | None = None,
+    excess: bool = False,
 ) -> tuple[dict[str, Field], np.ndarray]:
     """Variables of a product, of the pixels in one row, and their result codes.
 
@@ -180,6 +181,8 @@ def retrieved_fields(
         As of `retrieve_image`.
     smooth
         How neighbours are alike; None for every pixel on its own.
+    excess
+        As of `estimates`.
     """
     vector, forward = forward.vector, prepared(forward, states)
     of_x = prior.prior(states) if isinstance(prior, StateVector) else prior
@@ -194,7 +197,7 @@ def retrieved_fields(
     fields = pixel_fields(vector, forward.bands, retrieved, states, observations.num_values)
     if diagnostics:
         x = np.asarray(retrieved.inversion.x)
-        found = estimates(forward, observations, states, x, of_x, assumed)
+        found = estimates(forward, observations, states, x, of_x, assumed, excess=excess)
         fields |= diagnostic_fields(vector, x, found, assumed)
         within = posterior_intervals(forward, observations, states, x, found, of_x)
         fields |= interval_fields(vector, within)

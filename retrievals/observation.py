@@ -1,6 +1,6 @@
 """What the imager measured at each pixel, how well, and where that can be used."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -24,11 +24,14 @@ from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.radiance import FIRE_BANDS
 from abi_operator.scene.angles import sun_distance
 
-from .forward import THERMAL, ForwardModel
+from .forward import THERMAL
 from .results import ResultCode
 
 LARGEST_REFLECTANCE_FACTOR = 2.0
 """No scene reflects more than this, and files end at 1.25: it is in another unit (percent). [-]"""
+
+Seen = Callable[..., Array]
+"""A forward model, or what it is called for: x, a state and the sun's distance in, bands out."""
 
 _ATTEMPTED = ResultCode.SUCCESS
 # Flags of pixels that are not attempted. Optics beyond what they were fitted to are no reason: the
@@ -82,7 +85,7 @@ class Observation(eqx.Module):
         return counts.sum(axis=-1)
 
     def departure(
-        self, forward: ForwardModel, x: Float[Array, "*batch x"], state: State
+        self, forward: Seen, x: Float[Array, "*batch x"], state: State
     ) -> Float[Array, "*batch band"]:
         """Residuals of x: what a forward model makes of it where the sun was, less the measurement.
 

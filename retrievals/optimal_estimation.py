@@ -26,6 +26,7 @@ References
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -40,7 +41,7 @@ from abi_operator.machine.speed import Kept
 from .chunks import map_chunks
 from .forward import ForwardModel
 from .inverse import value_and_jacobian
-from .observation import Observation
+from .observation import Observation, Seen
 from .prior import Prior
 from .state_vector import StateVector
 
@@ -94,6 +95,8 @@ def estimates(
     x: Float[Array | np.ndarray, "pixel x"],
     prior: Prior | None = None,
     assumed: StateVector | None = None,
+    *,
+    excess: bool = False,
 ) -> Estimate:
     """Diagnose the solutions of many pixels.
 
@@ -106,6 +109,10 @@ def estimates(
     assumed
         What is not retrieved, with the covariance of its declarations; None for nothing. Where it
         moves a plume, levels go with its edges unless the forward model says otherwise.
+    excess
+        Whether what was measured is what x adds to the states, to which was added what the forward
+        model makes of the states themselves (`fires`). Both depend on what is assumed, and its
+        errors are those of the difference.
 
     Returns
     -------
@@ -121,12 +128,12 @@ def estimates(
         forward = replace(forward, plume_edges=True)
     rows = (prior, about, observations, states)
     rows = jax.tree.map(np.asarray, rows)
-    return map_chunks(lambda *chunk: _estimate_chunk((forward, assumed), *chunk), *rows, x)
+    return map_chunks(lambda *chunk: _estimate_chunk((forward, assumed, excess), *chunk), *rows, x)
 
 
 @Kept
 def _estimate_chunk(
-    how: tuple[ForwardModel, StateVector | None],
+    how: tuple[ForwardModel, StateVector | None, bool],
     prior: Prior | None,
     about: Prior | None,
     observations: Observation,
@@ -142,6 +149,7 @@ def _estimate_chunk(
 def _estimate(
     forward: ForwardModel,
     assumed: StateVector | None,
+    excess: bool,
     prior: Prior | None,
     about: Prior | None,
     observation: Observation,
@@ -152,12 +160,18 @@ def _estimate(
     size = x.size
     parameters = x[:0] if about is None else jnp.asarray(about.x_prior)
 
-    def whitened(both: Float[Array, " x_and_parameter"]) -> Float[Array, " band"]:
+    def whitened(both: Float[Array, " x_and_parameter"], seen: Seen = forward) -> Array:
         known = state if assumed is None else assumed.state(both[size:], state)
-        return observation.departure(forward, both[:size], known)
+        return observation.departure(seen, both[:size], known)
+
+    def added(x: Array, known: State, *distance: Array) -> Array:
+        """The same values, and the slopes of what x adds."""
+        without = forward.measured(known, *distance)
+        return forward(x, known, *distance) - (without - jax.lax.stop_gradient(without))
 
     both = jnp.concatenate([x, parameters])
-    residual, slopes = value_and_jacobian(whitened, both)
+    seen = added if excess and about is not None else forward
+    residual, slopes = value_and_jacobian(partial(whitened, seen=seen), both)
     jacobian, of_parameters = slopes[:, :size], slopes[:, size:]
     inverse_prior = jnp.zeros((size, size), x.dtype)
     if prior is not None:

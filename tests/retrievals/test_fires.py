@@ -17,6 +17,7 @@ from retrievals import ResultCode, retrieve_fires
 from retrievals.commands import retrieve
 from retrievals.fire_detection import DETECTED, surroundings
 from retrievals.fires import SCORE, with_fire
+from retrievals.images import retrieved_fields
 from retrievals.intervals import LEVELS
 
 BANDS = ("C05", "C06", "C07")
@@ -122,7 +123,14 @@ def test_fires_are_found_and_retrieved_by_day_and_by_night(burning):
     assert (np.diff([*bounds[:2], kelvin, *bounds[2:]], axis=0) > 0).all()
 
 
-def test_neighbours_stand_for_the_ground(burning):
+def test_neighbours_stand_for_the_ground(burning, monkeypatch):
+    excess = []  # of which diagnostics would be
+
+    def noted(*pixels, **how):
+        excess.append(how["excess"])
+        return retrieved_fields(*pixels, **how)
+
+    monkeypatch.setattr("retrievals.fires.retrieved_fields", noted)
     known = retrieve_fires(burning, noise=True, seed=3, prior=None)
     around = retrieve_fires(burning, noise=True, seed=3, background="neighbours")
     kelvin, share = np.array(list(FIRES.values())).T
@@ -132,6 +140,7 @@ def test_neighbours_stand_for_the_ground(burning):
         for name, truth in (("fire_temperature", kelvin), ("fire_fraction", share)):
             error = np.abs(of_fires(retrieval, name) - truth)[unsaturated]
             assert (error < 4 * of_fires(retrieval, f"{name}_sigma")[unsaturated]).all()
+    assert excess == [False, True]
     wider = of_fires(around, "fire_fraction_sigma") / of_fires(known, "fire_fraction_sigma")
     assert (wider[unsaturated] > 1).all()  # by the spread of the ground
 

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from veil import TWO, VEIL, seen, slopes, veiled_pixels
+from veil import TWO, VEIL, Veil, seen, slopes, veiled_pixels
 
 from retrievals import Bounded, Observation, Prior, Quantity, StateVector
 from retrievals.optimal_estimation import estimates
@@ -80,6 +80,27 @@ def test_diagnostics_are_their_formulas(diagnosed, index):
     transmittance = lit - dark
     error = np.abs(G @ transmittance[counts] * 0.5) * 0.02
     np.testing.assert_allclose(one.parameter_error[0], error, rtol=1e-9)
+
+
+class Bare(Veil):
+    """A veil that says what is there without it: the ground."""
+
+    def measured(self, full, sun_distance=None):
+        return full
+
+
+def test_of_an_excess_the_errors_are_those_of_the_difference(diagnosed):
+    """What the ground would show alone was measured, and is no error of the veil's."""
+    _, observation, ground, x, prior = diagnosed
+    bare = Bare(TWO.vector)
+    found = estimates(bare, observation, ground, x, prior, GROUND, excess=True)
+    whole = diagnosed[0]
+    np.testing.assert_allclose(found.residual, whole.residual, rtol=EXACT)
+    np.testing.assert_allclose(found.gain, whole.gain, rtol=EXACT)
+    for i in (0, 11):
+        lit, dark = (np.asarray(seen(TWO, x[i], ground[i] + a)) for a in (1, 0))
+        error = np.abs(found.gain[i] @ (lit - dark - 1) * 0.5) * 0.02
+        np.testing.assert_allclose(found.parameter_error[i, 0], error, rtol=1e-9)
 
 
 def test_the_linearity_test_sees_curvature(diagnosed):
