@@ -87,7 +87,8 @@ def retrieve_kind(
         return retrieve_fires(dataset, bands=bands, attributes=about, **how)
     if species is not None:
         about["aod_limit"] = aod_limit
-        how.setdefault("assumed", assumed_of_plume(species, bands))
+        assumed = assumed_of_plume(species, bands, effective_radius=effective_radius)
+        how.setdefault("assumed", assumed)
     how["where"] = where or ("cloud" if species is None else "plume")
     return retrieve_image(dataset, vector, bands=bands, species=species, attributes=about, **how)
 

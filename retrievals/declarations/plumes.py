@@ -99,8 +99,8 @@ def aod_550(species: str, limit: float = AOD_LIMIT) -> Quantity:
 def ssa_shift(species: str) -> Quantity:
     """One shift of the logit of a plume's single-scattering albedo in all bands.
 
-    A scan begins at -0.4: half as much absorption again, relative to scattering, as the scenario
-    specifies.
+    A scan begins at -0.8 and 0.8: 2.2 times as much absorption, relative to scattering, as the
+    scenario specifies, and 0.45 times as much.
     """
     return Quantity(
         "ssa_shift",
@@ -154,12 +154,27 @@ def height_shift(species: str) -> Quantity:
     )
 
 
-def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:
+def assumed_of_plume(
+    species: str, bands: Sequence[str], *, effective_radius: bool = False
+) -> StateVector:
     """What a retrieval of a plume assumes, and how well that may be known.
 
     Albedo of the ground in each band, to 0.01; height of the plume, to 500 m; its asymmetry factor,
-    to a shift of the logit of 0.1, which is 0.023 at 0.65. A `MiePlume` has no asymmetry factor.
+    to a shift of the logit of 0.1, which is 0.023 at 0.65.
+
+    Parameters
+    ----------
+    species
+        Name of the plume in the state.
+    bands
+        Names of the bands.
+    effective_radius
+        Whether the effective radius is retrieved, or the plume is a `MiePlume`: then the asymmetry
+        factor is that of the radius, and nothing is assumed of it.
     """
+    known = [*(albedo(band) for band in bands), height_shift(species)]
+    if effective_radius:
+        return StateVector(tuple(known))
     asymmetry = Quantity(
         "asymmetry_shift",
         "1",
@@ -170,7 +185,7 @@ def assumed_of_plume(species: str, bands: Sequence[str]) -> StateVector:
         sigma=0.1,
         mean=0.0,
     )
-    return StateVector((*(albedo(band) for band in bands), height_shift(species), asymmetry))
+    return StateVector((*known, asymmetry))
 
 
 def lifted(plume: Plume | MiePlume, value: Float[Array, "*batch"]) -> Plume | MiePlume:

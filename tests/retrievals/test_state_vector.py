@@ -1,5 +1,6 @@
 """Meaning of x, and the prior."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,7 +18,14 @@ from abi_operator import (
 )
 from abi_operator.optics import effective_radius, mie_optics
 from retrievals import Bounded, Prior, Quantity, StateVector, Unbounded
-from retrievals.declarations import albedo, aod_550, fire, liquid_cloud, plume
+from retrievals.declarations import (
+    albedo,
+    aod_550,
+    assumed_of_plume,
+    fire,
+    liquid_cloud,
+    plume,
+)
 from retrievals.kinds import BANDS
 from retrievals.quantities import part, replaced, scaled
 
@@ -148,6 +156,25 @@ def test_an_effective_radius_sets_what_a_shift_refines(state):
     found = mie.state(mie.x(0.8, 4.0), state)
     np.testing.assert_allclose(mie.held(found, "effective_radius_um"), 4.0, rtol=ROUNDING)
     np.testing.assert_allclose(mie.held(found, "aod_550"), 0.8, rtol=ROUNDING)
+
+
+def test_of_what_a_radius_sets_nothing_is_assumed(state):
+    """A shift of the asymmetry factor would be lost under that of the radius, without an error."""
+    radius = StateVector(plume("ash", effective_radius=True).quantities[1:])
+    bare = jax.tree.map(jnp.asarray, state)
+
+    def seen(assumed, by):
+        shifted = assumed.state(assumed.prior(bare).x_prior + by, bare)
+        return radius.state(radius.x(2.0), shifted)
+
+    for retrieved, lost in ((False, ["asymmetry_shift"]), (True, [])):
+        assumed = assumed_of_plume("ash", BANDS, effective_radius=retrieved)
+        same = [
+            name
+            for name, by in zip(assumed.names, 0.1 * np.eye(assumed.size), strict=True)
+            if eqx.tree_equal(seen(assumed, by), seen(assumed, 0 * by))
+        ]
+        assert same == lost
 
 
 def test_a_cloud_gets_optical_thickness_and_radius(state):
