@@ -81,8 +81,9 @@ def retrieve(
     where: Annotated[
         str | None,
         typer.Option(
-            help="'all' to retrieve every usable pixel and not only where there is a plume or "
-            "cloud, or where a fire stands out; without plume it needs a prior."
+            help="'all' to retrieve every usable pixel and not only where there is a plume, or "
+            "where a fire stands out; without plume it needs a prior. Cloud is retrieved where the "
+            "result has cloud water, and nowhere else."
         ),
     ] = None,
     background: Annotated[
@@ -94,9 +95,8 @@ def retrieve(
     ] = None,
 ) -> None:
     """Retrieve a plume, cloud or fires from a simulated result."""
-    if kind not in KINDS:
-        raise typer.BadParameter(f"cannot retrieve {kind!r}; choose from {', '.join(KINDS)}.")
     try:
+        vector = vector_of(kind, retrieve_ssa, effective_radius)
         chosen = (
             None
             if bands is None
@@ -109,7 +109,6 @@ def retrieve(
         prior = _smooth_prior(kind, smooth, diagnostics, prior)
         if where not in (None, "all"):
             raise ValueError(f"--where is 'all' or nothing; got {where!r}.")
-        vector = vector_of(kind, retrieve_ssa, effective_radius)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     how: dict[str, Any] = {} if background is None else {"background": background}

@@ -18,7 +18,7 @@ and albedo the result then has errors only as far as they change what the fire a
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import equinox as eqx
 import jax
@@ -61,12 +61,16 @@ from .prior import Prior
 from .product import make_product
 from .results import ResultCode
 from .state_vector import StateVector
+from .usable_pixels import check_where
 
 SCORE = "fire_detection_score"
 """Variable of the product: the score of `fire_detection` at every pixel."""
 
 BACKGROUNDS = ("stored", "neighbours")
 Background = Literal["stored", "neighbours"]
+WhereOfFires = Literal["detected", "all"]
+WHERE_OF_FIRES: tuple[WhereOfFires, ...] = get_args(WhereOfFires)
+"""Where fires are retrieved, see `retrieve_fires`."""
 
 # A fire shines by night too.
 _UNUSABLE = UNUSABLE & ~QUALITY_FLAGS["night"]
@@ -78,7 +82,7 @@ def retrieve_fires(
     *,
     bands: Sequence[str] = FIRE_BANDS,
     background: Background = "stored",
-    where: Literal["detected", "all"] = "detected",
+    where: WhereOfFires = "detected",
     threshold: float = DETECTED,
     noise: bool = False,
     seed: int = 0,
@@ -102,7 +106,7 @@ def retrieve_fires(
         One of `BACKGROUNDS`.
     where, threshold
         ``"detected"``: where the score of `fire_detection` reaches the threshold; ``"all"``: at
-        every usable pixel.
+        every usable pixel, those without score, too.
     assumed
         What is not retrieved, for the diagnostics; None for `assumed_of_fire`.
     noise, seed, prior, diagnostics, num_streams, minimiser, attributes
@@ -119,11 +123,13 @@ def retrieve_fires(
     InputError
         Where the Dataset lacks a variable or a band.
     ValueError
-        Where a band is none in which a fire shines, or background is none of `BACKGROUNDS`.
+        Where a band is none in which a fire shines, background is none of `BACKGROUNDS`, or `where`
+        none of `WHERE_OF_FIRES`.
     """
     bands, vector = check_bands(bands, FIRE_BANDS), fire()
     if background not in BACKGROUNDS:
         raise ValueError(f"background must be one of {', '.join(BACKGROUNDS)}; got {background!r}.")
+    check_where(where, WHERE_OF_FIRES)
     _check(dataset, bands, vector.size, prior)
     num_streams = streams_of_attributes(dataset.attrs) if num_streams is None else num_streams
     with jax.enable_x64(True):
@@ -142,7 +148,7 @@ def retrieve_fires(
         ]
         codes = np.stack(
             [
-                _codes(image, values, found, threshold if where == "detected" else -np.inf)
+                _codes(image, values, found, threshold if where == "detected" else None)
                 for image, values, found in zip(images, measured, around, strict=True)
             ]
         )
@@ -243,11 +249,14 @@ def _surroundings(
 
 
 def _codes(
-    image: xr.Dataset, measured: np.ndarray, around: Surroundings, threshold: float
+    image: xr.Dataset, measured: np.ndarray, around: Surroundings, threshold: float | None
 ) -> np.ndarray:
-    """Result code of the pixels that are not to be attempted, 0 (success) elsewhere."""
+    """Result code of the pixels that are not to be attempted, 0 (success) elsewhere; without
+    threshold whatever their score.
+    """
     codes = np.full(measured.shape[1:], ResultCode.SUCCESS, np.int8)
-    codes[~(around.score >= threshold)] = ResultCode.NO_PLUME
+    if threshold is not None:
+        codes[~(around.score >= threshold)] = ResultCode.NO_PLUME
     codes[~np.isfinite(measured).any(axis=0)] = ResultCode.INVALID_INPUT
     codes[(image["quality_flag"].values.astype(int) & _UNUSABLE) != 0] = ResultCode.UNUSABLE
     return codes

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import jax
 import numpy as np
@@ -19,14 +19,7 @@ from abi_operator.settings import streams_of_attributes
 from .forward import ForwardModel, prepared
 from .intervals import posterior_intervals
 from .inverse import DEFAULT_MINIMISER, Minimiser
-from .observation import (
-    Observation,
-    add_noise,
-    imager_of,
-    known_saturated,
-    observe,
-    usable,
-)
+from .observation import Observation, add_noise, imager_of, known_saturated, observe
 from .optimal_estimation import estimates
 from .pixels import retrieve_pixels
 from .prior import Prior
@@ -34,6 +27,7 @@ from .product import Field, diagnostic_fields, interval_fields, make_product, pi
 from .results import ResultCode
 from .smooth import Smoothness, retrieve_smooth, smoothness
 from .state_vector import StateVector
+from .usable_pixels import WHERE, Where, check_where, usable
 
 REFLECTIVE = ("C01", "C02", "C03", "C04", "C05", "C06")
 """Bands of which a result can be retrieved from."""
@@ -45,7 +39,7 @@ def retrieve_image(
     *,
     bands: Sequence[str],
     species: str | None = None,
-    where: Literal["plume", "cloud", "all"] = "plume",
+    where: Where = "plume",
     noise: bool = False,
     seed: int = 0,
     prior: Prior | StateVector | None = None,
@@ -59,8 +53,9 @@ def retrieve_image(
     """Retrieve a state vector from the result of a simulation, pixel by pixel, in float64.
 
     Whatever is not retrieved (ground, cloud, air and its gases, height and spectrum of a plume) is
-    known from the scenario in the result. Brightness of the plume serves as its mask; what is
-    retrieved is not looked at.
+    known from the scenario in the result, but fires, whose bands do not count where one shines
+    (`retrieve_fires`). Brightness of the plume serves as its mask; what is retrieved is not looked
+    at.
 
     Parameters
     ----------
@@ -74,9 +69,10 @@ def retrieve_image(
     species
         Name of the plume that is retrieved, None if none is.
     where
-        ``"plume"``: where the plume's brightness is above 0; ``"cloud"``: where there is cloud
-        water; ``"all"``: at every usable pixel, where those without plume end as ``not_converged``
-        unless there is a prior.
+        ``"plume"``: where the plume's brightness is above 0, or if none is retrieved at every
+        usable pixel; ``"cloud"``: where there is cloud water; ``"all"``: at every usable pixel,
+        where those without plume end as ``not_converged`` unless there is a prior. A `liquid_cloud`
+        needs ``"cloud"``: where there is no water, there is no place for it.
     noise, seed
         Whether to add noise (`observation.add_noise`) to the reflectances, and its seed. Without
         noise a fit has to be exact; posterior errors are those that noise would cause.
@@ -114,10 +110,11 @@ def retrieve_image(
     InputError
         Where the Dataset lacks a variable or a band.
     ValueError
-        Where smooth is not above 0, comes without prior or with diagnostics, which are of single
-        pixels.
+        Where `where` is none of these; where smooth is not above 0, comes without prior or with
+        diagnostics, which are of single pixels.
     """
     bands = check_bands(bands, REFLECTIVE)
+    check_where(where, WHERE)
     if smooth is not None and (prior is None or diagnostics):
         raise ValueError(
             "smooth needs a prior, and has no diagnostics, which are of single pixels."

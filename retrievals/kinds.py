@@ -1,16 +1,17 @@
 """What the command retrieves, by name: a state vector, its bands and where it is looked for."""
 
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import xarray as xr
 
 from abi_operator.radiance import FIRE_BANDS
 
 from .declarations import AOD_LIMIT, assumed_of_plume, fire, liquid_cloud, plume
-from .fires import retrieve_fires
+from .fires import WhereOfFires, retrieve_fires
 from .images import retrieve_image
 from .state_vector import StateVector
+from .usable_pixels import Where, check_where
 
 BANDS = ("C01", "C02", "C03")
 """Bands that are used by default for smoke: in C06, it is hardly seen."""
@@ -49,7 +50,7 @@ def retrieve_kind(
     retrieve_ssa: bool = False,
     effective_radius: bool = False,
     aod_limit: float = AOD_LIMIT,
-    where: Literal["plume", "cloud", "detected", "all"] | None = None,
+    where: Where | WhereOfFires | None = None,
     **how: Any,
 ) -> xr.Dataset:
     """Retrieve one of `KINDS` from the result of a simulation.
@@ -71,12 +72,25 @@ def retrieve_kind(
         Optical depths of a plume from here on are out of reach. [-]
     where
         As of `retrieve_image` or `retrieve_fires`; None for where there is a plume, or cloud, or
-        where a fire is detected.
+        where a fire is detected. Cloud is looked for where the scenario has cloud water, whatever
+        is said: elsewhere there is no place for it.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `retrieve_image`, or of fire as of `retrieve_fires`.
+
+    Raises
+    ------
+    InputError
+        Where the Dataset lacks a variable or a band.
+    ValueError
+        Where the kind is none of `KINDS`, has not what is to be retrieved of it, or is nowhere to
+        be looked for by this `where`; and as of `retrieve_image` or `retrieve_fires`.
     """
-    chosen = KINDS[kind]
-    bands = chosen.bands if bands is None else tuple(bands)
     vector = vector_of(kind, retrieve_ssa, effective_radius, aod_limit)
-    species = chosen.species
+    bands = KINDS[kind].bands if bands is None else tuple(bands)
+    species = KINDS[kind].species
     about: dict[str, Any] = {
         "title": f"{kind.capitalize()} retrieved from synthetic imagery",
         "kind": kind,
@@ -89,7 +103,10 @@ def retrieve_kind(
         about["aod_limit"] = aod_limit
         assumed = assumed_of_plume(species, bands, effective_radius=effective_radius)
         how.setdefault("assumed", assumed)
-    how["where"] = where or ("cloud" if species is None else "plume")
+    else:
+        check_where("cloud" if where is None else where, ("cloud", "all"))
+        where = "cloud"
+    how["where"] = "plume" if where is None else where
     return retrieve_image(dataset, vector, bands=bands, species=species, attributes=about, **how)
 
 
@@ -104,8 +121,11 @@ def vector_of(
     Raises
     ------
     ValueError
-        Where cloud is to have a single-scattering albedo that is retrieved, or a fire particles.
+        Where the kind is none of `KINDS`, or where cloud is to have a single-scattering albedo that
+        is retrieved, or a fire particles.
     """
+    if kind not in KINDS:
+        raise ValueError(f"cannot retrieve {kind!r}; choose from {', '.join(KINDS)}.")
     species = KINDS[kind].species
     if species is not None:
         return plume(

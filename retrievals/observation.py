@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal
 
 import equinox as eqx
 import jax
@@ -25,7 +24,6 @@ from abi_operator.radiance import FIRE_BANDS
 from abi_operator.scene.angles import sun_distance
 
 from .forward import THERMAL
-from .results import ResultCode
 
 LARGEST_REFLECTANCE_FACTOR = 2.0
 """No scene reflects more than this, and files end at 1.25: it is in another unit (percent). [-]"""
@@ -33,7 +31,6 @@ LARGEST_REFLECTANCE_FACTOR = 2.0
 Seen = Callable[..., Array]
 """A forward model, or what it is called for: x, a state and the sun's distance in, bands out."""
 
-_ATTEMPTED = ResultCode.SUCCESS
 # Flags of pixels that are not attempted. Optics beyond what they were fitted to are no reason: the
 # retrieval's operator has the same.
 UNUSABLE = sum(bit for name, bit in QUALITY_FLAGS.items() if name != "outside_fit")
@@ -306,35 +303,3 @@ def observe(columns: xr.Dataset, bands: tuple[str, ...]) -> Observation:
     distance = np.full(len(values), distance_of(columns))
     found = measurement(values, bands, imager_of(columns), sun_distance=distance, saturated=limited)
     return found if THERMAL in bands else replace(found, sun_distance=None)
-
-
-def usable(
-    image: xr.Dataset,
-    bands: tuple[str, ...],
-    species: str | None,
-    where: Literal["plume", "cloud", "all"],
-) -> np.ndarray:
-    """Result code of the pixels that are not to be attempted, 0 (success) elsewhere.
-
-    Parameters
-    ----------
-    image
-        A result of one time.
-    bands
-        Bands that are to be used.
-    species
-        Name of the plume, None if none is retrieved.
-    where
-        ``"plume"``: only where the specified plume is (its brightness above 0), as if a plume mask
-        had been made beforehand; ``"cloud"``: only where there is cloud water; ``"all"``:
-        everywhere.
-    """
-    codes = np.full((image.sizes["y"], image.sizes["x"]), _ATTEMPTED, np.int8)
-    measured = image["reflectance_factor"].sel(band=list(bands)).transpose("band", "y", "x")
-    codes[~np.isfinite(measured.values).any(axis=0)] = ResultCode.INVALID_INPUT
-    codes[(image["quality_flag"].values & UNUSABLE) != 0] = ResultCode.UNUSABLE
-    if where == "plume" and species is not None:
-        codes[~(image[f"{species}_brightness"].values > 0)] = ResultCode.NO_PLUME
-    if where == "cloud":
-        codes[~(image["liquid_mass_path"].sum("layer").values > 0)] = ResultCode.NO_PLUME
-    return codes

@@ -28,11 +28,13 @@ class ResultCode(enum.IntEnum):
 _MESSAGES = {
     ResultCode.SUCCESS: "Retrieved.",
     ResultCode.NO_PLUME: (
-        "Not attempted: there is no plume, no cloud, or no fire that stands out, to be retrieved "
-        "here; where='all' attempts every pixel."
+        "Not attempted: there is no plume, no fire that stands out, or no cloud water to be "
+        "retrieved here; where='all' attempts every usable pixel, but cloud needs cloud water."
     ),
     ResultCode.UNUSABLE: (
-        "Not attempted: quality_flag reports night, a grazing sun or view, or missing albedo."
+        "Not attempted: quality_flag reports night (no reason for fires), a grazing sun or view, a "
+        "satellite out of sight, missing albedo, or an anisotropic ground that reflects less than "
+        "nothing or more than all."
     ),
     ResultCode.INVALID_INPUT: (
         "Not attempted: no measurement, one that is no reflectance factor (above 2: in percent?), "

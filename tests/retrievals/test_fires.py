@@ -145,6 +145,23 @@ def test_neighbours_stand_for_the_ground(burning, monkeypatch):
     assert (wider[unsaturated] > 1).all()  # by the spread of the ground
 
 
+def test_all_are_pixels_without_score_too(burning):
+    """Where C07 is missing nothing stands out, and C05 and C06 tell of the fire all the same."""
+    place = (1, 6)
+    alone = burning.copy(deep=True)
+    alone["quality_flag"][:] = QUALITY_FLAGS["no_albedo"]
+    alone["quality_flag"][place] = 0
+    alone["radiance"][(2, *place)] = np.nan
+    assert retrieve_fires(alone)["result_code"].values[place] == ResultCode.NO_PLUME
+    found = retrieve_fires(alone, where="all")
+    assert (found["result_code"].values == ResultCode.UNUSABLE).sum() == np.prod(SHAPE) - 1
+    assert found["result_code"].values[place] == ResultCode.SUCCESS
+    assert found["num_values"].values[place] == 2 and np.isnan(found[SCORE].values[place])
+    assert abs(found["fire_temperature"].values[place] - FIRES[place][0]) < 0.1
+    with pytest.raises(ValueError, match="where must be one of detected, all; got 'everywhere'"):
+        retrieve_fires(alone, where="everywhere")
+
+
 def test_the_command_retrieves_fires(burning, tmp_path):
     how = {"num_streams": 2, "gases": "none"}
     with ResultWriter(tmp_path / "r.nc", times=TIMES, shape=SHAPE, attributes=how) as writer:

@@ -6,7 +6,7 @@ import xarray as xr
 
 from abi_operator.files import InputError
 from abi_operator.nomenclature import QUALITY_FLAGS
-from retrievals import ResultCode, retrieve_smoke
+from retrievals import ResultCode, retrieve_kind, retrieve_smoke
 from retrievals.kinds import BANDS
 
 DARK, BRIGHT, CLOUDY = 0, 1, 2  # rows of a scene
@@ -98,6 +98,34 @@ def test_nothing_to_attempt_is_a_product_too(simulated):
     clear = simulated.assign(smoke_brightness=xr.zeros_like(simulated["smoke_brightness"]))
     retrieval = retrieve_smoke(clear)
     assert (retrieval["result_code"] == ResultCode.NO_PLUME).all()
+
+
+def test_cloud_is_where_there_is_water(simulated):
+    """Where there is none there is no place for it, whoever asks for every pixel."""
+    dry = simulated.assign(liquid_mass_path=0 * simulated["liquid_mass_path"])
+    found = retrieve_kind(dry, "cloud", bands=("C02", "C03"), where="all")
+    assert (found["result_code"] == ResultCode.NO_PLUME).all()
+    assert "cloud needs cloud water" in ResultCode.NO_PLUME.message
+
+
+def test_what_cannot_be_asked_for_is_named(simulated):
+    with pytest.raises(ValueError, match="cannot retrieve 'fog'; choose from smoke, ash, dust, "):
+        retrieve_kind(simulated, "fog")
+    for kind, where, allowed in (
+        ("smoke", "detected", "plume, cloud, all"),
+        ("smoke", "", "plume, cloud, all"),
+        ("cloud", "plume", "cloud, all"),
+        ("fire", "plume", "detected, all"),
+    ):
+        with pytest.raises(ValueError, match=f"one of {allowed}; got '{where}'"):
+            retrieve_kind(simulated, kind, where=where)
+
+
+def test_with_a_radius_nothing_is_assumed_of_the_asymmetry(simulated, monkeypatch):
+    monkeypatch.setattr("retrievals.kinds.retrieve_image", lambda *_, **how: how["assumed"])
+    assert "asymmetry_shift" in retrieve_kind(simulated, "smoke").names
+    known = retrieve_kind(simulated, "smoke", effective_radius=True)
+    assert known.names == (*(f"albedo_{band}" for band in BANDS), "height_shift")
 
 
 def test_what_a_dataset_lacks_is_named(simulated):

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 import scipy
 import xarray as xr
 
@@ -17,9 +18,9 @@ from retrievals.observation import (
     measurement,
     noise_sigma,
     observe,
-    usable,
 )
 from retrievals.results import ResultCode
+from retrievals.usable_pixels import usable
 
 
 @jax.jit
@@ -185,3 +186,5 @@ def test_pixels_are_refused_for_a_reason(make_scenario):
     assert codes[0, 2] == ResultCode.NO_PLUME
     assert (np.delete(codes.ravel(), [1, 2, 4]) == ResultCode.SUCCESS).all()
     assert usable(image, BANDS, "smoke", "all")[0, 2] == ResultCode.SUCCESS
+    with pytest.raises(ValueError, match="where must be one of plume, cloud, all; got 'plumes'"):
+        usable(image, BANDS, "smoke", "plumes")
