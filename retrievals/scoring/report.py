@@ -33,7 +33,12 @@ PLUME_DETECTED = 2.0
 
 _HEADS = ("", "N", "bias", "rmse", "max", "r", "slope", "inside EE", "68 %", "95 %", "chi2")
 # Codes of pixels that were not attempted.
-_NOT_ATTEMPTED = (ResultCode.NO_PLUME, ResultCode.UNUSABLE, ResultCode.INVALID_INPUT)
+_NOT_ATTEMPTED = (
+    ResultCode.NO_PLUME,
+    ResultCode.UNUSABLE,
+    ResultCode.INVALID_INPUT,
+    ResultCode.TOO_FEW_BANDS,
+)
 
 
 def score_retrieval(result: xr.Dataset, retrieval: xr.Dataset) -> xr.Dataset:

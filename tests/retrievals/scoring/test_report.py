@@ -102,6 +102,10 @@ def test_plumes_are_told_from_clear_pixels_that_were_attempted(made_up):
     assert values["num_true"] == 3 and values["num_pixels"] == 4
     assert values["hit_rate"] == pytest.approx(2 / 3) and values["false_alarm_rate"] == 0
     assert values["roc_area"] == pytest.approx(2 / 3)
+    retrieval["result_code"][1, 0] = ResultCode.TOO_FEW_BANDS  # not attempted any more
+    fewer = score_retrieval(result, retrieval)["detection_value"].to_series()
+    assert fewer["num_true"] == 2 and fewer["num_pixels"] == 3 and fewer["hit_rate"] == 1
+    retrieval["result_code"][1, 0] = ResultCode.POOR_FIT
     assert "detection, score 2 or more: 66.7 % of 3 pixels hit" in format_report(
         score_retrieval(*made_up)
     )
