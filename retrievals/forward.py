@@ -68,7 +68,22 @@ class ForwardModel:
         state: State,
         sun_distance: Float[Array | np.ndarray, "*batch"] | None = None,
     ) -> Float[Array, "*batch band"]:
-        """What is measured of a state into which x is put (`measured`)."""
+        """What is measured of a state into which x is put.
+
+        Parameters
+        ----------
+        x
+            Without units, as `StateVector.x` makes it of quantities (..., x). [-]
+        state
+            What is known of as many columns, whose axes lead those of layers and levels.
+        sun_distance
+            Distance of the sun of each column, None for 1. [AU]
+
+        Returns
+        -------
+        Array
+            As of `measured` (..., band).
+        """
         return self.measured(self.state(x, state), sun_distance)
 
     def measured(
@@ -116,6 +131,12 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
         The forward model.
     states
         Concrete columns, batched along one leading axis.
+
+    Returns
+    -------
+    ForwardModel
+        The same with ``num_doublings``, and with ``plume_edges`` where these were left open and x
+        moves the base or the top of a plume.
     """
     chunk = chunk_of_pixels_to_read()
     max_tau = np.max(map_chunks(partial(_largest_tau, forward), states, chunk=chunk))

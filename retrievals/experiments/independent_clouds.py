@@ -1,7 +1,7 @@
 """Liquid cloud whose truth the inversion does not share.
 
 The truth has droplets that grow upwards, from 0.6 to 1.2 times their mean effective radius in two
-layers, a cloud one layer (1.1 km) higher than is believed, and strips of different optical
+layers, a cloud one layer (1.2 km) higher than is believed, and strips of different optical
 thickness and albedo, whose reflectances are averaged: thick strips add less than thin ones lack.
 The inversion has droplets of one radius and one column.
 """
@@ -36,7 +36,7 @@ MEAN, SIGMAS = (12.0, 10.0), (0.6, 0.4)
 
 _ALBEDO = (0.02, 0.25)
 _UNEVEN_CLOUD = 0.3  # relative standard deviation among the strips
-_LAYERS = (-4, -3)  # of the believed cloud, from the ground up: 0.4 to 2.3 km, nearly
+_LAYERS = (-4, -3)  # of the believed cloud, top first: 1.3 to 3.6 km
 _MICRON, _DROPS = 1e-6, 2e11  # [m]; of some 10 um in a kilogram
 _SHARES, _GROWTH = (0.6, 0.4), (1.2, 0.6)  # of optical thickness; of the radius, top first
 
