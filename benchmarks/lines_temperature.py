@@ -106,7 +106,7 @@ def main(folder: Path) -> None:
         for view, sun in itertools.product(VIEWS, SUNS):
             exact = light.temperature(light.top(view, sun))
             ours, without = operator(found, view, sun, GASES), operator(found, view, sun, ())
-            largest = max(largest, abs(ours - exact))
+            largest = np.maximum(largest, abs(ours - exact))
             when = "night" if sun is None else f"{sun:.0f}"
             numbers = f"{exact:.2f} | {ours:.2f} | {ours - exact:+.2f} | {without:.2f}"
             print(f"| {name} | {view:.0f} | {when} | {numbers} |")

@@ -64,7 +64,8 @@ def report(folder: Path, band: str) -> None:
             exact, fitted = by_lines(found, band, parts), by_sum(found, band, gas)
             row(name, f"{gas}, lines", exact)
             row("", f"{gas}, sum", fitted)
-            largest[gas] = max(largest.get(gas, 0.0), float(np.abs(fitted - exact).max()))
+            apart = np.abs(fitted - exact).max()
+            largest[gas] = float(np.maximum(largest.get(gas, 0.0), apart))
         if "HDO" in found.depths:
             light = [gas for gas in VAPOUR if gas != "HDO"]
             row("", "H2O without HDO", by_lines(found, band, light))

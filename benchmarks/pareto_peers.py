@@ -1,8 +1,9 @@
 """Other solvers on the columns of `pareto_columns`: their settings, and the cheapest that suffice.
 
-A peer may be set in three ways: its streams, with or without the correction of Nakajima and Tanaka
-(with so many moments as the phase functions have), and when CDISORT ends its azimuth series. Given
-merged layers, neighbouring layers of one optics are one to it, and a column that is there twice is
+A peer may be set in three ways: its streams, from two or the fewest that it takes on; with or
+without an exact single scattering (the DISORTs' correction of Nakajima and Tanaka, sasktran2's own
+integral), by so many moments as the phase functions have; and when CDISORT ends its azimuth series.
+Given merged layers, neighbouring layers of one optics are one to it, and a column that comes twice is
 solved once; merging is not part of its time.
 """
 
@@ -17,10 +18,10 @@ import pareto_ours as ours
 from pareto_columns import Columns
 from peers import AXES, PEERS, Peers, planck_temperature
 
-STREAMS = (4, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
+STREAMS = (2, 4, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 STOPS = (0.0, 1e-5, 1e-4, 1e-3, 1e-2)
-CORRECTED = ("nanodisort", "disortpp")  # those that have the correction, and end early
-PLAIN = (*CORRECTED, "sasktran2")
+DISORTS = ("nanodisort", "disortpp")  # those that end early, and may be given merged layers
+PLAIN = (*DISORTS, "sasktran2")
 ONE_GEOMETRY = 0.6, 0.65, 1.6  # cosines of sun and view, azimuth [rad], for all columns
 LONGEST_SERIES = 385  # moments
 SERIES_END = 1e-3  # (2l + 1) chi_l of the last moment of a series
@@ -175,11 +176,10 @@ class Runner:
             self.peers.put_arrays(*self.forms[form])
             self.put = form
         solved = self.of_row[:count].max() + 1 if setting.merged else count
-        options = {}
-        if setting.peer in CORRECTED:
-            n = setting.num_streams
-            length = max(self.num_moments, n + 1) if setting.corrected else n + 1
-            options = {"corrected": setting.corrected, "num_moments": length}
+        n = setting.num_streams
+        length = max(self.num_moments, n + 1) if setting.corrected else n + 1
+        options = {"corrected": setting.corrected, "num_moments": length}
+        if setting.peer in DISORTS:
             options["early_stop"] = setting.early_stop
         start = time.perf_counter()
         brf = self.peers.solve(setting.peer, setting.num_streams, solved, **options)[0]
@@ -206,7 +206,7 @@ def search(runner: Runner, peer, true_brf, budgets, careful):
         guess = rate * SEARCH_SECONDS
         count = int(np.clip(guess, min(FEWEST, len(true_brf)), len(true_brf)))
         seconds = []
-        for corrected in (True, False) if peer in CORRECTED else (False,):
+        for corrected in (True, False):
             for stop in STOPS if careful else (0.0,):
                 setting = Setting(peer, n, corrected, stop, careful)
                 trial = tried(runner, setting, true_brf[:count])
@@ -246,7 +246,7 @@ def searches(runner, true_own, true_one, budgets):
     """Trials by peer and whether they are careful."""
     found = {}
     for peer, careful in product(PLAIN, (False, True)):
-        if careful and peer not in CORRECTED:
+        if careful and peer not in DISORTS:
             continue
         true_brf = true_one if PEERS[peer].one_geometry else true_own
         found[peer, careful] = search(runner, peer, true_brf, budgets, careful)

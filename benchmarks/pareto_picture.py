@@ -17,6 +17,7 @@ COLOURS = {
     "disortpp": "#2a9d6f",
     "sasktran2": "#8a6fb8",
     "nanodisort, differences": "#1f5fa8",
+    "disortpp, differences": "#2a9d6f",
     "sasktran2 + derivatives": "#8a6fb8",
 }
 SMALLEST = 1e-6  # errors below are drawn here

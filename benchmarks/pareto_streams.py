@@ -18,14 +18,14 @@ from rounds import table
 SEEDS = range(100, 105)
 STREAMS = {
     "W1": (8, 10, 12, 16, 20),
-    "W2": (8, 10, 12, 16, 20),
+    "W2": (8, 10, 12, 16, 20, 24),
     "W3": (2, 4, 6),
     "W4": (8, 10, 12, 16, 20),
 }
 
 
 def drawn(workload, seed, count):
-    """A random sample of an image, of the layers of the first seed."""
+    """A random sample of an image of 40 layers."""
     columns = pareto_columns.columns(workload, 10 * count, seed, shuffled=True, num_layers=40)
     return columns.first(count)
 

@@ -156,8 +156,11 @@ def _pythonic(columns, num_streams):
         yield np.pi / mu0[i] * float(seen(mu[i], 0.0, np.pi - azimuth[i]))
 
 
-def _sasktran2(columns, num_streams, derivatives=False):
-    """All columns at once, as wavelengths; so all have the sun and view of the first column."""
+def _sasktran2(columns, num_streams, derivatives=False, corrected=False, num_moments=NUM_MOMENTS):
+    """All columns at once, as wavelengths; so all have the sun and view of the first column.
+
+    `corrected`: light scattered once is its own exact integral, by so many moments.
+    """
     sk = importlib.import_module("sasktran2")
     tau, ssa, moments, albedo, *_ = (columns[k] for k in AXES)
     mu0, mu, azimuth = (float(_shared[k][0]) for k in ("mu0", "mu", "azimuth"))
@@ -165,8 +168,10 @@ def _sasktran2(columns, num_streams, derivatives=False):
     config = sk.Config()
     config.num_streams, config.num_threads, config.delta_m_scaling = num_streams, 1, True
     config.multiple_scatter_source = sk.MultipleScatterSource.DiscreteOrdinates
-    config.single_scatter_source = sk.SingleScatterSource.DiscreteOrdinates
-    config.num_singlescatter_moments = used = num_streams + 1
+    once = sk.SingleScatterSource
+    config.single_scatter_source = once.Exact if corrected else once.DiscreteOrdinates
+    used = max(num_moments, num_streams + 1) if corrected else num_streams + 1
+    config.num_singlescatter_moments = used
     levels = LAYER_DEPTH * np.arange(layers + 1)
     interpolation, flat = sk.InterpolationMethod.LowerInterpolation, sk.GeometryType.PlaneParallel
     geometry = sk.Geometry1D(mu0, 0, PLANET_RADIUS, levels, interpolation, flat)
@@ -197,9 +202,9 @@ def _sasktran2(columns, num_streams, derivatives=False):
     return np.pi / mu0 * result["radiance"].values[:, 0, 0]
 
 
-def _sasktran2_derivatives(columns, num_streams):
+def _sasktran2_derivatives(columns, num_streams, **options):
     """The same, with derivatives in tau and ssa of every layer and the albedo."""
-    return _sasktran2(columns, num_streams, derivatives=True)
+    return _sasktran2(columns, num_streams, derivatives=True, **options)
 
 
 @dataclass(frozen=True)

@@ -159,8 +159,9 @@ def rows_of(num_streams, script, tuned, peers, options, bars):
             else:
                 first[program] = spent
         for program, found in brf.items():
-            if found.ndim:  # not where there is only the sum
-                error[program] = max(error[program], np.max(np.abs(found / expected - 1)))
+            # Where there is only the sum, of that; NumPy's largest, which no NaN passes.
+            wanted = expected if found.ndim else expected.sum()
+            error[program] = np.maximum(error[program], np.max(np.abs(found / wanted - 1)))
     return judged(num_streams, programs, first, seconds, error, (script, tuned), options, bars)
 
 
@@ -182,7 +183,7 @@ def judged(num_streams, programs, first, seconds, error, processes, options, bar
             bars.judge(
                 share >= SHARE, f"plain {name} at {num_streams}: {share:.0%} of the tuned rate"
             )
-        row += [f"{micro[None] / t:.2f}", f"{error[program]:.0e}" if error[program] else ""]
+        row += [f"{micro[None] / t:.2f}", f"{error[program]:.0e}"]
         rows.append([*row, f"{first[program]:.1f}"])
         bars.judge(error[program] <= AGREE, f"{name} at {num_streams}: {error[program]:.0e} apart")
     return rows

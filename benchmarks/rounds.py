@@ -123,8 +123,7 @@ def digits(x):
 
 def apart(brf, reference):
     """Largest relative difference where both are known, over all rounds."""
-    pairs = [(a.ravel(), b.ravel()) for a, b in zip(brf, reference, strict=True)]
-    return max(np.max(np.abs(a[: len(b)] / b[: len(a)] - 1)) for a, b in pairs)
+    return np.max(relative(brf, reference))  # of NumPy's, which no NaN passes
 
 
 def relative(brf, truth):

@@ -39,7 +39,8 @@ SIGNS = ("not negative", "rising in albedo")
 
 
 def failed(rows, name, precision):
-    return np.nan_to_num(rows[name]) > LIMITS[name][PRECISIONS.index(precision)]
+    """What is above its limit, and what is not finite where there is none."""
+    return (rows[name] > LIMITS[name][PRECISIONS.index(precision)]) | np.isinf(rows[name])
 
 
 def by_stratum(rows, precision):
