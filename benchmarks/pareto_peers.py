@@ -3,8 +3,8 @@
 A peer may be set in three ways: its streams, from two or the fewest that it takes on; with or
 without an exact single scattering (the DISORTs' correction of Nakajima and Tanaka, sasktran2's own
 integral), by so many moments as the phase functions have; and when CDISORT ends its azimuth series.
-Given merged layers, neighbouring layers of one optics are one to it, and a column that comes twice is
-solved once; merging is not part of its time.
+Given merged layers, neighbouring layers of one optics are one to it, and a column that comes twice
+is solved once; merging is not part of its time.
 """
 
 import time
