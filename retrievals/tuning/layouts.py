@@ -27,6 +27,9 @@ _ABI_BAND = re.compile(
 _MODIS_BAND = re.compile(
     r"(?:(?P<quantity>reflectance_factor|brf|reflectance|modis)_)?band_?(?P<band>[1237])"
 )
+_IS_BRF = {"brf": True, "reflectance_factor": False, "cmi": False}
+"""What names say of a division by the cosine of the solar zenith angle: others, such as a bare
+``reflectance``, say nothing."""
 _LATITUDE = ("latitude", "lat", "XLAT")
 _LONGITUDE = ("longitude", "lon", "XLONG")
 _LARGEST_QUALITY = 1
@@ -43,14 +46,15 @@ class Found(NamedTuple):
     values
         Reflectance (row, column), NaN where there is none. [-]
     is_brf
-        Whether it says itself that it was divided by the cosine of the solar zenith angle.
+        Whether it says itself that it was divided by the cosine of the solar zenith angle, or that
+        it was not; None where it says neither.
     source
         The variable, in words.
     """
 
     band: str
     values: np.ndarray
-    is_brf: bool
+    is_brf: bool | None
     source: str
 
 
@@ -142,7 +146,8 @@ def _named(file: xr.Dataset, path: object) -> list[Found]:
         band, source = (
             (MODIS[name], f"{label} of MODIS") if name in MODIS else (name.upper(), label)
         )
-        found.append(Found(band, _plane(file, label, path), match["quantity"] == "brf", source))
+        is_brf = _IS_BRF.get(match["quantity"])
+        found.append(Found(band, _plane(file, label, path), is_brf, source))
     return found
 
 

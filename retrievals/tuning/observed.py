@@ -45,8 +45,9 @@ def read_observed(
         where the grids have to be the same. Of a grid of scan angles a place on the ground has the
         pixel that it is seen in, without this. [km]
     quantity
-        What the numbers are where their names do not say: ``"reflectance_factor"`` as in ABI files,
-        or ``"brf"``, divided by the cosine of the solar zenith angle. [-]
+        What the numbers are where their names do not say (``C01``, ``reflectance_C01``, ``Band3``):
+        ``"reflectance_factor"`` as in ABI files, or ``"brf"``, divided by the cosine of the solar
+        zenith angle. Those of ABI's own files and of results are known. [-]
 
     Returns
     -------
@@ -160,7 +161,7 @@ def _laid(
     values = np.where(index >= 0, one.values.ravel()[np.maximum(index, 0)], np.nan)
     saturated = np.isposinf(values)
     values = np.where(np.isfinite(values), values, np.nan)
-    if one.is_brf or quantity == "brf":
+    if one.is_brf or (one.is_brf is None and quantity == "brf"):
         values = values * np.cos(np.radians(image["solar_zenith_angle"].values))
     return values, saturated
 

@@ -55,10 +55,14 @@ def placed(
 
 
 def spacing_km(latitude: np.ndarray, longitude: np.ndarray) -> float:
-    """Median distance of neighbours in a row of a grid. [km]"""
+    """Median distance of neighbours in a row of a grid, or in a column where rows are of one pixel.
+
+    Of a single pixel it is 0. [km]
+    """
     points = _unit(latitude, longitude)
-    apart = np.linalg.norm(np.diff(points, axis=1), axis=-1)
-    return float(np.median(2 * np.arcsin(apart / 2))) * EARTH_RADIUS_KM
+    axis = 1 if latitude.shape[1] > 1 else 0
+    apart = np.linalg.norm(np.diff(points, axis=axis), axis=-1)
+    return float(np.median(2 * np.arcsin(apart / 2))) * EARTH_RADIUS_KM if apart.size else 0.0
 
 
 def _check_same(

@@ -56,8 +56,9 @@ def test_a_result_with_several_times_is_taken_at_the_scenes(image, tmp_path):
     with ResultWriter(tmp_path / "result.nc", times=times, shape=(3, 8)) as writer:
         for k, block in enumerate((dark, image)):
             writer.write(k, slice(0, 3), block.drop_vars("time"))
-    seen = read_observed([tmp_path / "result.nc"], image)
-    np.testing.assert_allclose(seen["reflectance_factor"], image["reflectance_factor"])
+    for quantity in ("reflectance_factor", "brf"):  # a result says itself which it is
+        seen = read_observed([tmp_path / "result.nc"], image, quantity=quantity)
+        np.testing.assert_allclose(seen["reflectance_factor"], image["reflectance_factor"])
     with pytest.raises(InputError, match="30 minutes apart"):
         read_observed(
             [tmp_path / "result.nc"], image.assign_coords(time=time + np.timedelta64(2, "h"))
@@ -69,6 +70,16 @@ def test_a_division_by_the_cosine_of_the_sun_is_undone(image, write):
     for name, quantity in (("brf_C0{}", "reflectance_factor"), ("C0{}", "brf")):
         seen = read_observed(write(named(image, name, 1 / mu0)), image, quantity=quantity)
         np.testing.assert_allclose(seen["reflectance_factor"], image["reflectance_factor"])
+
+
+def test_what_says_that_it_was_not_divided_is_believed(image, write):
+    own = image["reflectance_factor"]
+    for name in ("reflectance_factor_C0{}", "CMI_C0{}"):
+        seen = read_observed(write(named(image, name)), image, quantity="brf")
+        np.testing.assert_array_equal(seen["reflectance_factor"], own)
+    red = own.sel(band="C02").values
+    seen = read_observed(write(abi_file(image, "C02", red)), image, quantity="brf")
+    assert np.nanmax(np.abs(seen["reflectance_factor"].values - red)) < 1e-12
 
 
 def test_bands_of_modis_stand_for_abis(image, write):
@@ -180,3 +191,14 @@ def test_neighbours_are_as_far_apart_as_the_sphere_has_it(image):
     expected = np.radians(0.043) * np.cos(np.radians(33.036)) * 6371
     own = image["latitude"].values, image["longitude"].values
     assert abs(spacing_km(*own) / expected - 1) < 1e-6
+
+
+@pytest.mark.parametrize("rows", [slice(None), slice(0, 1)])
+def test_a_scene_may_be_one_column_wide_or_one_pixel(image, write, rows):
+    narrow = image.isel(x=slice(3, 4), y=rows)
+    file = named(narrow)
+    seen = read_observed(write(file), narrow)
+    np.testing.assert_array_equal(seen["reflectance_factor"], narrow["reflectance_factor"])
+    file["latitude"] = file["latitude"] + 0.01
+    with pytest.raises(InputError, match="1.11 km away"):
+        read_observed(write(file, "moved.nc"), narrow)
