@@ -23,7 +23,8 @@ class Score(NamedTuple):
     bias, rmse, max_error
         Mean, root mean square and largest absolute value of retrieved minus true.
     correlation, slope
-        Pearson's correlation, and slope of the regression of retrieved on true values. [-]
+        Pearson's correlation, and slope of the regression of retrieved on true values; NaN where
+        true values are all the same, or retrieved ones are, for the correlation. [-]
     within
         Share of pairs inside the expected error (`expected_error` of the truth, of optical depth).
         [-]
@@ -82,18 +83,25 @@ def score(
     covariance = np.mean(spread * (retrieved - retrieved.mean()))
     variance = np.mean(spread**2)
     deviations = np.sqrt(variance) * retrieved.std()
+    varies = _varies(truth) and variance > 0
+    correlates = varies and _varies(retrieved) and deviations > 0
     percentiles = zip(PERCENTILES, np.percentile(error, PERCENTILES), strict=True)
     return Score(
         num_pairs=error.size,
         bias=float(error.mean()),
         rmse=float(np.sqrt(np.mean(error**2))),
         max_error=float(np.abs(error).max()),
-        correlation=float(covariance / deviations) if deviations > 0 else float("nan"),
-        slope=float(covariance / variance) if variance > 0 else float("nan"),
+        correlation=float(covariance / deviations) if correlates else float("nan"),
+        slope=float(covariance / variance) if varies else float("nan"),
         within=float("nan") if allowed is None else float(np.mean(np.abs(error) <= allowed(truth))),
         **{f"percentile_{rank}": float(value) for rank, value in percentiles},
         **_calibration(error, sigma),
     )
+
+
+def _varies(values: np.ndarray) -> bool:
+    """Whether numbers differ by more than rounding, of which their variance is never free."""
+    return bool(np.ptp(values) > 8 * np.finfo(float).eps * np.abs(values).max())
 
 
 def _calibration(error: np.ndarray, sigma: np.ndarray | None) -> dict[str, float]:

@@ -34,6 +34,14 @@ def test_too_few_pairs_are_not_a_number():
     assert one.bias == pytest.approx(0.1) and np.isnan(one.slope) and np.isnan(one.correlation)
 
 
+def test_what_does_not_vary_has_no_slope():
+    """The variance of 513 times 0.1 is 2e-34, and not 0."""
+    same, other = np.full(513, 0.1), np.linspace(0, 1, 513)
+    of_truth, of_retrieved = score(other, same), score(same, other)
+    assert np.isnan([of_truth.slope, of_truth.correlation, of_retrieved.correlation]).all()
+    assert abs(of_retrieved.slope) < 1e-12
+
+
 def test_bins_share_edges_with_the_one_below():
     bins = binned_scores(RETRIEVED, TRUTH, TRUTH, (0.0, 1.0, 2.5, np.inf))
     assert [b.num_pairs for b in bins] == [2, 1, 1]
