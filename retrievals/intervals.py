@@ -95,8 +95,7 @@ def posterior_intervals(
     """
     x = np.asarray(x)
     num_pixels, size = x.shape
-    variances, vectors = np.linalg.eigh(np.asarray(found.posterior_covariance, np.float64))
-    axes = vectors * np.sqrt(np.maximum(variances, 0))[:, None, :]
+    axes = principal_axes(np.asarray(found.posterior_covariance, np.float64))
     # A row of steps is one call, and all have as many: one program serves both ways.
     steps = _steps(size)
     residual = partial(_residuals, forward, observations, states, x, axes)
@@ -124,6 +123,15 @@ def posterior_intervals(
         rows = np.flatnonzero(sampled)
         settle(rows, points, density, _in_calls(residual, points, len(steps), rows))
     return Intervals(bounds, effective, sampled)
+
+
+def principal_axes(covariance: Float[np.ndarray, "pixel x x"]) -> Float[np.ndarray, "pixel x x"]:
+    """Principal axes times their standard deviations; NaN of a pixel whose covariance is no number,
+    of which one would end the decomposition of all.
+    """
+    fine = np.isfinite(covariance).all(axis=(1, 2), keepdims=True)
+    variances, vectors = np.linalg.eigh(np.where(fine, covariance, 0))
+    return np.where(fine, vectors * np.sqrt(np.maximum(variances, 0))[:, None, :], np.nan)
 
 
 def _steps(size: int) -> np.ndarray:

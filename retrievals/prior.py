@@ -50,7 +50,8 @@ class Prior(eqx.Module):
         ------
         ValueError
             Where a shape does not fit, or a covariance is not one. Means that are not finite are
-            left to the pixels that they belong to.
+            left to the pixels that they belong to; a pixel whose covariance is not finite has a
+            mean of NaN instead, too.
         """
         mean, covariance = np.asarray(self.x_prior), np.asarray(self.S_prior)
         size = len(names)
@@ -64,6 +65,12 @@ class Prior(eqx.Module):
                     f"{label} has the shape {array.shape}; a state vector of {elements} needs "
                     f"{own}, or {(num_pixels, *own)} for a prior of each pixel."
                 )
+        if covariance.ndim == 3:
+            unknown = ~np.isfinite(covariance).all(axis=(1, 2))
+            covariance = np.where(unknown[:, None, None], np.eye(size), covariance)
+            mean = np.where(unknown[:, None], np.nan, mean)
+        elif not np.isfinite(covariance).all():
+            raise ValueError("S_prior of all pixels is not finite; a covariance is.")
         asymmetry = np.abs(covariance - np.swapaxes(covariance, -1, -2))
         if not np.all(asymmetry <= 1e-6 * np.abs(covariance).max()):
             raise ValueError("S_prior is not symmetric; a covariance is.")

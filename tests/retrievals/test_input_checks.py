@@ -45,10 +45,12 @@ def test_what_a_pixel_cannot_be_is_its_own_code(veiled):
     measured[3], sigma[3] = 100 * measured[3], 100 * sigma[3]  # in percent
     x_prior = np.asarray(VEIL.vector.x(truth)) + 0.01
     x_prior[4] = np.nan
-    prior = Prior(x_prior, np.eye(1))
+    S_prior = np.ones((len(truth), 1, 1))
+    S_prior[5] = np.nan
+    prior = Prior(x_prior, S_prior)
     found = retrieve_pixels(VEIL, Observation(measured, sigma), ground, prior=prior)
-    assert set(found.codes[:5]) == {ResultCode.INVALID_INPUT}
-    assert set(found.codes[5:]) == {ResultCode.SUCCESS}
+    assert set(found.codes[:6]) == {ResultCode.INVALID_INPUT}
+    assert set(found.codes[6:]) == {ResultCode.SUCCESS}
     assert "percent" in ResultCode.INVALID_INPUT.message
 
 

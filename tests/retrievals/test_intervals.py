@@ -6,7 +6,7 @@ import pytest
 from veil import TIGHT, TWO, seen, veiled_pixels
 
 from retrievals import Observation, Prior
-from retrievals.intervals import LEVELS, NUM_POINTS, posterior_intervals
+from retrievals.intervals import LEVELS, NUM_POINTS, posterior_intervals, principal_axes
 from retrievals.optimal_estimation import LARGEST_NONLINEARITY, estimates
 from retrievals.pixels import retrieve_pixels
 
@@ -87,3 +87,12 @@ def test_a_pixel_that_is_no_number_has_no_interval(noisy):
     within = posterior_intervals(TWO, observation, bad, x, found, PRIOR)
     assert np.isnan(within.bounds[2]).all() and within.effective_points[2] == 0
     assert np.isfinite(np.delete(within.bounds, 2, axis=0)).all()
+
+
+@pytest.mark.parametrize("unknown", [np.nan, np.inf])
+def test_a_covariance_that_is_no_number_spoils_no_other(unknown):
+    """Of three unknowns, of which LAPACK gives up a matrix that is not finite."""
+    covariance = np.stack([np.full((3, 3), unknown), np.diag([9.0, 4.0, 1.0]) + 0.5])
+    axes = principal_axes(covariance)
+    assert np.isnan(axes[0]).all()
+    np.testing.assert_allclose(axes[1] @ axes[1].T, covariance[1], rtol=1e-12)

@@ -278,5 +278,11 @@ def test_a_prior_fits_its_state_vector():
         Prior(np.zeros((4, 2)), np.eye(2)).of_pixels(5, names)
     with pytest.raises(ValueError, match="not symmetric"):
         Prior(np.zeros(2), np.array([[1.0, 0.5], [0.0, 1.0]])).of_pixels(5, names)
+    unknown = np.stack([np.eye(2), np.full((2, 2), np.nan), 3 * np.eye(2)])
+    own = Prior(np.zeros(2), unknown).of_pixels(3, names)
+    assert np.isfinite(own.x_prior).all(axis=1).tolist() == [True, False, True]
+    assert np.isfinite(own.S_prior).all() and (own.S_prior[2] == unknown[2]).all()
+    with pytest.raises(ValueError, match="not finite"):
+        Prior(np.zeros(2), unknown[1]).of_pixels(5, names)
     with pytest.raises(ValueError, match="eigenvalue of -1"):
         Prior(np.zeros(2), np.diag([1.0, -1.0])).of_pixels(5, names)
