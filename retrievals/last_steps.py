@@ -36,9 +36,12 @@ _MANY = 256  # pixels a chunk, where there are as many: to begin and to end one 
 
 
 class Moved(NamedTuple):
-    """After a step with a Jacobian of elsewhere: x, and whether the step is small. [-]"""
+    """After a step with a Jacobian of elsewhere: x, what is left of the residuals, and whether the
+    step is small. [-]
+    """
 
     x: Float[Array | np.ndarray, "*batch x"]
+    left: Float[Array | np.ndarray, "*batch residual"]
     near: Bool[Array | np.ndarray, "*batch"]
 
 
@@ -79,14 +82,23 @@ def finish(
         some, before = jax.tree.map(lambda x: x[rows], (inputs, found))
         x = before.inversion.x
         moved = map_chunks(chord, *some, x, before.here.jacobian, chunk=chunk)
-        x = np.where(moved.near[:, None], moved.x, x)
-        after = eqx.tree_at(
-            lambda f: (f.inversion.x, f.inversion.num_steps, f.inversion.converged),
-            before,
-            (x, before.inversion.num_steps + 1, moved.near),
-        )
+        after = eqx.tree_at(lambda f: f.inversion, before, _after_chord(before.inversion, moved))
         found = jax.tree.map(partial(with_rows, rows), found, after)
     return _damped(partial(map_chunks, tangent, chunk=chunk), inputs, found)
+
+
+def _after_chord(before: Inversion, moved: Moved) -> Inversion:
+    """What has been found: the chord's end with its costs where the step was small."""
+    num_bands = moved.left.shape[1] - moved.x.shape[1]
+    measurement, prior = np.split(np.asarray(moved.left) ** 2, [num_bands], axis=1)
+    near = np.asarray(moved.near)
+    found = moved.x, measurement.sum(axis=1), prior.sum(axis=1)
+    then = before.x, before.measurement_cost, before.prior_cost
+    return eqx.tree_at(
+        lambda i: (i.x, i.measurement_cost, i.prior_cost, i.num_steps, i.converged),
+        before,
+        (*map(partial(_chosen, near), found, then), before.num_steps + 1, near),
+    )
 
 
 def _damped(
@@ -163,8 +175,9 @@ def _chord_chunk(
     ) -> Moved:
         pixel = Pixel.of(forward, observation, state, x, prior)
         z = pixel.z(x)
-        step = Linear(z, pixel(z), jacobian).step
-        return Moved(pixel.x(z + step), in_sigmas(jacobian, step) < _LAST_STEP)
+        here = Linear(z, pixel(z), jacobian)
+        near = in_sigmas(jacobian, here.step) < _LAST_STEP
+        return Moved(pixel.x(z + here.step), here.left, near)
 
     return jax.vmap(of_one)(prior, observations, states, x, jacobian)
 

@@ -68,7 +68,7 @@ def from_rough(pixels):
 
 @pytest.mark.parametrize("number", range(len(OFF)))
 def test_however_rough_the_first_steps_are_the_minimum_is_the_same(pixels, from_rough, number):
-    tight = pixels[-1]
+    _, _, prior, tight = pixels
     found = jax.tree.map(lambda x: x[number], from_rough)
     assert found.converged.all()
     sigma = np.sqrt(np.diagonal(tight.covariance, axis1=1, axis2=2))
@@ -76,6 +76,9 @@ def test_however_rough_the_first_steps_are_the_minimum_is_the_same(pixels, from_
     # Slopes are those one step before the end.
     np.testing.assert_allclose(found.covariance, tight.covariance, rtol=0.1, atol=1e-4)
     np.testing.assert_allclose(found.cost, tight.cost, rtol=1e-2, atol=1e-2)
+    # Costs are those where it ended, and not where the last step but one would have led.
+    departure = (found.x - prior.x_prior) / np.sqrt(np.diagonal(prior.S_prior))
+    np.testing.assert_allclose(found.prior_cost, np.sum(departure**2, axis=1), rtol=1e-9)
 
 
 def test_the_coarse_model_is_cheaper_or_none():
