@@ -58,7 +58,7 @@ class Begun(NamedTuple):
     x
         Where to go on. [-]
     jacobian
-        Of all residuals in z, at the last evaluation. [-]
+        Of all residuals in z, at the last evaluation, from which x is a step. [-]
     num_steps
         Evaluations. [-]
     near
@@ -153,7 +153,7 @@ def _begin_chunk(
 
     def of_one(prior: Prior, observation: Observation, state: State, x: Array) -> Begun:
         pixel = Pixel.of(forward, observation, state, x, prior)
-        here, _, num_steps, _ = descended(pixel, pixel.z(x), minimiser, _NEAR)
+        here, num_steps, _ = descended(pixel, pixel.z(x), minimiser, _NEAR)
         step = here.step
         length = jnp.sqrt(jnp.sum(step**2))
         step = step * jnp.minimum(1, _LONGEST / jnp.where(length > 0, length, 1))

@@ -151,13 +151,13 @@ def invert(
     how = minimiser.chosen(prior is not None)
     tolerance = max(how.tolerance or 0.0, _smallest_tolerance(x_first.dtype))
     pixel = Pixel.of(forward, observation, state, x_first, prior)
-    here, solution, num_steps, successful = descended(pixel, pixel.z(x_first), how, tolerance)
+    here, num_steps, successful = descended(pixel, pixel.z(x_first), how, tolerance)
     # The step of Gauss and Newton from the last linearisation costs nothing more. A cost known to
     # its last digits only may refuse it: that is the end, too.
     step = here.step
     settled = _negligible(step, here.z, tolerance)
     settled &= _negligible(here.jacobian @ step, here.residual, tolerance)
-    return pixel.inversion(here, solution, num_steps, successful | settled)
+    return pixel.inversion(here, num_steps, successful | settled)
 
 
 class Linear(NamedTuple):
@@ -224,12 +224,10 @@ class Pixel(eqx.Module):
         """The same, linearised."""
         return Linear(z, *value_and_jacobian(self, z))
 
-    def inversion(
-        self, here: Linear, otherwise: Float[Array, " x"], num_steps: Array, converged: Array
-    ) -> "Inversion":
-        """What has been found: a step on from the last linearisation if converged, or another z."""
+    def inversion(self, here: Linear, num_steps: Array, converged: Array) -> "Inversion":
+        """What has been found: a step on from the last linearisation if converged, or there."""
         covariance = posterior_covariance(here.jacobian)
-        z = jnp.where(converged, here.z + here.step, otherwise)
+        z = jnp.where(converged, here.z + here.step, here.z)
         residual = jnp.where(converged, here.left, here.residual)
         num_bands = len(self.forward.bands)
         kernel = averaging_kernel(covariance, here.jacobian[:num_bands])
@@ -246,8 +244,11 @@ class Pixel(eqx.Module):
 
 def descended(
     pixel: Pixel, z: Float[Array, " x"], how: Minimiser, tolerance: float
-) -> tuple[Linear, Float[Array, " x"], Array, Array]:
-    """The last linearisation of a minimisation, where it ended, its steps, and its success."""
+) -> tuple[Linear, Array, Array]:
+    """The linearisation where a minimisation ended, its evaluations, and its success.
+
+    A last step that was rejected is none: it ended where that began.
+    """
 
     def linearised(z: Float[Array, " x"], _: None) -> tuple[Array, Linear]:
         # A value whose derivative is the small matrix itself: optimistix carries the linear map
@@ -264,7 +265,9 @@ def descended(
         throw=False,
     )
     successful = solution.result == optx.RESULTS.successful
-    return solution.aux, solution.value, jnp.asarray(solution.stats["num_steps"]), successful
+    # `solution.aux` is that of the accepted step before (since optimistix 0.1.0), the state's that
+    # of the solution.
+    return solution.state.aux, jnp.asarray(solution.stats["num_steps"]), successful
 
 
 def _solved(root: Array, right: Array, trans: int = 0) -> Array:

@@ -190,7 +190,7 @@ def _tangent_chunk(
         pixel = Pixel.of(forward, observation, state, x, prior)
         here = pixel.linear(pixel.z(x))
         small = in_sigmas(here.jacobian, here.step) < _LAST_STEP
-        inversion = pixel.inversion(here, here.z, jnp.ones((), int), jnp.array(True))
+        inversion = pixel.inversion(here, jnp.ones((), int), jnp.array(True))
         return Found(eqx.tree_at(lambda i: i.converged, inversion, small), here)
 
     return jax.vmap(of_one)(prior, observations, states, x)

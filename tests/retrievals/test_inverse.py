@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from veil import VEIL, veiled_pixels
 
-from retrievals import Quantity, StateVector, Unbounded, measurement
+from retrievals import Observation, Quantity, StateVector, Unbounded, measurement
 from retrievals.inverse import SOLVERS, Minimiser, invert
 from retrievals.kinds import BANDS
 from retrievals.pixels import retrieve_pixels
@@ -169,6 +169,29 @@ class Parabola:
 
     def __call__(self, x, state):
         return 0.1 * x**2 + state
+
+
+@dataclass(frozen=True)
+class Arc(Parabola):
+    """A forward model so flat far from 0 that a step of Gauss and Newton goes too far."""
+
+    def __call__(self, x, state):
+        return 0.1 * jnp.arctan(x) + state
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_costs_are_those_at_x_where_steps_ran_out(solver):
+    """Also after a second step that was rejected, as that from 3 is by what can reject one."""
+    arc, sigma, starts = Arc(), jnp.array([1e-3]), np.array([[0.5], [3.0]])
+    of_one = partial(invert, arc, Observation(0 * sigma, sigma), 0 * sigma)
+    found = jax.vmap(lambda x: of_one(x, minimiser=Minimiser(None, 2, solver)))(starts)
+    assert not found.converged.any()
+    expected = (0.1 * np.arctan(found.x[:, 0]) / 1e-3) ** 2
+    np.testing.assert_allclose(found.measurement_cost, expected, rtol=1e-12)
+    slope = 100 / (1 + np.asarray(found.x[:, 0]) ** 2)
+    np.testing.assert_allclose(found.covariance[:, 0, 0], slope**-2.0, rtol=1e-12)
+    rejected = np.asarray(found.x == starts)[:, 0]
+    assert rejected.tolist() == [False, solver != "gauss_newton"]
 
 
 def test_both_of_two_solutions_are_given():
