@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from abi_operator import State
 from abi_operator.machine.speed import Kept
@@ -20,10 +20,14 @@ from .precision import Smoothness
 
 
 class Linearised(NamedTuple):
-    """Whitened residuals of the measurements and their Jacobians in z, block by block."""
+    """Whitened residuals of the measurements and their Jacobians in z, block by block.
+
+    Both are 0 of pixels that are not `fine`, of which something was not finite.
+    """
 
     residual: Float[Array | np.ndarray, "pixel band"]
     jacobian: Float[Array | np.ndarray, "pixel band x"]
+    fine: Bool[Array | np.ndarray, " pixel"]
 
 
 def linearised(
@@ -44,12 +48,7 @@ def linearised(
     z
         Where. [-]
     """
-    found = map_chunks(partial(_linearise_chunk, forward), prior, observations, states, z)
-    fine = np.isfinite(found.residual).all(axis=1) & np.isfinite(found.jacobian).all(axis=(1, 2))
-    return Linearised(
-        np.where(fine[:, None], found.residual, 0),
-        np.where(fine[:, None, None], found.jacobian, 0),
-    )
+    return map_chunks(partial(_linearise_chunk, forward), prior, observations, states, z)
 
 
 @Kept
@@ -65,7 +64,9 @@ def _linearise_chunk(
             x = jnp.asarray(prior.x_prior) + prior.root @ z
             return observation.departure(forward, x, state)
 
-        return Linearised(*value_and_jacobian(residual, z))
+        value, jacobian = value_and_jacobian(residual, z)
+        fine = jnp.isfinite(value).all() & jnp.isfinite(jacobian).all()
+        return Linearised(jnp.where(fine, value, 0), jnp.where(fine, jacobian, 0), fine)
 
     return jax.vmap(of_one)(priors, observations, states, z)
 

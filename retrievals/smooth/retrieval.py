@@ -81,6 +81,7 @@ def retrieve_smooth(
         (np.asarray(alone.inversion.num_steps) + steps, np.full(len(z), converged)),
     )
     codes = result_codes(forward.vector, inversion, inversion, num_values, exact=False)
+    codes[~np.asarray(here.fine) & (num_values > 0)] = ResultCode.NONFINITE
     codes = np.where(np.isin(alone.codes, _KEPT), alone.codes, codes).astype(np.int8)
     return Retrieved(inversion, codes, inversion)
 
@@ -92,7 +93,11 @@ def _descended(
     tolerance: float,
     max_steps: int,
 ) -> tuple[np.ndarray, Linearised, int, bool]:
-    """z at the minimum, what is linear there, evaluations, and whether it was reached."""
+    """z at the minimum, what is linear there, evaluations, and whether it was reached.
+
+    A step after which a pixel is no number that was one before is none: what it measures would be
+    missing in the sum, and so make it less. One that becomes a number is not held against a step.
+    """
     here = linearise(z)
     cost, damping = joint_cost(here, smooth, z), 0.0
     for evaluation in range(1, max_steps + 1):
@@ -103,9 +108,10 @@ def _descended(
             return z, here, evaluation, True
         there = z + np.asarray(step)
         moved = linearise(there)
-        new = joint_cost(moved, smooth, there)
-        if new <= cost:
-            z, here, cost = there, moved, new
+        fine = np.asarray(here.fine)
+        both = moved._replace(residual=np.where(fine[:, None], moved.residual, 0))
+        if not (fine & ~moved.fine).any() and joint_cost(both, smooth, there) <= cost:
+            z, here, cost = there, moved, joint_cost(moved, smooth, there)
             damping = damping / _DAMPING if damping > 1e-3 else 0.0
         else:
             damping = max(damping * _DAMPING, 1e-2)

@@ -1,14 +1,29 @@
 """An image retrieved as a whole, under the veil."""
 
+from dataclasses import dataclass
+from functools import partial
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy
 from veil import TWO, seen
 
-from retrievals import Prior, ResultCode, measurement, retrieve_pixels
+from retrievals import (
+    Minimiser,
+    Observation,
+    Prior,
+    Quantity,
+    ResultCode,
+    StateVector,
+    Unbounded,
+    measurement,
+    retrieve_pixels,
+)
 from retrievals.input_checks import checked
 from retrievals.kinds import BANDS
+from retrievals.quantities import replaced
 from retrievals.smooth import (
     joint_cost,
     joint_gradient,
@@ -16,6 +31,7 @@ from retrievals.smooth import (
     retrieve_smooth,
     smoothness,
 )
+from retrievals.smooth.retrieval import _descended
 
 SHAPE, LENGTH = (16, 16), 3.0
 PRIOR = Prior(np.asarray(TWO.vector.x(0.3, 0.0)), np.diag([0.8**2, 0.05**2]))
@@ -116,6 +132,32 @@ def test_a_joint_image_is_better_than_its_pixels(image):
     np.testing.assert_allclose(stated, exact, rtol=0.2)
     ratio = np.abs(found.inversion.x - x) / stated
     assert abs(np.mean(ratio < 1) - 0.683) < 0.08  # correlated errors: fewer than 512 are free
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A forward model that shows x, and is no number beyond 1."""
+
+    vector: StateVector = StateVector((Quantity("q", "1", "", "", Unbounded(), replaced, 1, 0),))
+    bands: tuple[str, ...] = ("C01",)
+
+    def __call__(self, x, state):
+        return jnp.where(x > 1, jnp.nan, x) + state
+
+
+def test_what_is_no_number_any_more_is_not_won():
+    """The measurement of the second of three pixels leads beyond the edge."""
+    sigma = np.full((3, 1), 0.1)
+    observation, ground = Observation(np.array([[0.5], [1.5], [0.5]]), sigma), np.zeros((3, 1))
+    smooth, prior = smoothness(np.ones((1, 3), bool), 1.0), Prior(np.zeros(1), np.eye(1))
+    _, usable, own = checked(Edge(), observation, prior)
+    linearise = partial(linearised, Edge(), usable, ground, own)
+    z, here, _, _ = _descended(linearise, smooth, np.zeros((3, 1)), 1e-2, 5)
+    assert here.fine.all() and (0 < z).all() and (z <= 1).all()
+    # Single pixels that end with their first step, there: the code says what the joint ones found.
+    how = Minimiser(0.999, starts="prior")
+    found = retrieve_smooth(Edge(), observation, ground, prior=prior, smooth=smooth, minimiser=how)
+    assert found.codes.tolist() == [ResultCode.SUCCESS, ResultCode.NONFINITE, ResultCode.SUCCESS]
 
 
 def test_a_pixel_without_measurements_is_filled_and_says_so(image):
