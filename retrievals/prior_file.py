@@ -70,8 +70,6 @@ def _with(quantity: Quantity, table: object, path: str) -> Quantity:
     numbers = all(type(x) in (int, float) for x in (mean, sigma))
     if not numbers or not 0 < sigma < _LARGEST or abs(mean) > _LARGEST:
         raise InputError(f"{words}; got {table}.")
-    x = quantity.transform.x(jnp.asarray(mean, float))
-    if not jnp.isfinite(x):
+    if not jnp.isfinite(quantity.transform.x(jnp.asarray(mean, float))):
         raise InputError(f"the prior {path}: {mean} is no possible mean of {name}.")
-    slope = float(quantity.transform.slope(x))
-    return dataclasses.replace(quantity, mean=float(mean), sigma=float(sigma) / slope)
+    return dataclasses.replace(quantity, mean=float(mean), sigma=float(sigma), sigma_in_units=True)

@@ -38,7 +38,8 @@ class Quantity:
     put
         From the part and the quantity to the new part.
     sigma
-        What is known of it where nobody says more: standard deviation of its prior, in x. [-]
+        What is known of it where nobody says more: standard deviation of its prior, in x [-] or, if
+        `sigma_in_units`, at the mean and in the unit of the quantity.
     mean
         Mean of that prior, in the unit of the quantity; None for what the state holds itself, by
         `get`, pixel by pixel.
@@ -50,6 +51,8 @@ class Quantity:
     largest_error
         Posterior standard deviation from which a retrieval is no success, of the value, in the unit
         of the quantity; None for no limit.
+    sigma_in_units
+        Whether `sigma` is in the unit of the quantity: in x, it then depends on the mean.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Quantity:
     get: Callable[[Any], Array] | None = None
     starts: tuple[float, ...] = ()
     largest_error: Callable[[Any], Any] | None = None
+    sigma_in_units: bool = False
 
     def __post_init__(self) -> None:
         if not self.sigma > 0:

@@ -121,19 +121,29 @@ class StateVector:
         Returns
         -------
         Prior
-            One for all pixels, or if there are `states` one for each of them.
+            One for all pixels; or one for each of the `states`, where a mean is theirs, which then
+            is kept inside the limits of its quantity, by a ten-thousandth of their distance.
+
+        Raises
+        ------
+        ValueError
+            Where a mean is that of states, and there are none or they do not tell.
         """
-        means = []
+        means, sigmas = [], []
         for quantity in self.quantities:
             mean = quantity.mean
             if mean is None:
                 if states is None:
                     raise ValueError(f"the prior of {quantity.name} is that of states; give them.")
-                mean = self.held(states, quantity.name)
-            means.append(np.asarray(quantity.transform.x(jnp.asarray(mean, float))))
+                held = jnp.asarray(self.held(states, quantity.name), float)
+                mean = quantity.transform.inside(held)
+            x = quantity.transform.x(jnp.asarray(mean, float))
+            slope = quantity.transform.slope(x) if quantity.sigma_in_units else 1.0
+            means.append(np.asarray(x))
+            sigmas.append(quantity.sigma / np.asarray(slope))
         x_prior = np.stack(np.broadcast_arrays(*means), axis=-1)
-        S_prior = np.diag(np.square([quantity.sigma for quantity in self.quantities]))
-        return Prior(x_prior, S_prior.astype(x_prior.dtype))
+        sigma = np.stack(np.broadcast_arrays(*sigmas), axis=-1).astype(x_prior.dtype)
+        return Prior(x_prior, sigma[..., None] ** 2 * np.eye(self.size, dtype=sigma.dtype))
 
     def report(
         self, x: Float[Array, " x"], state: State, covariance: Float[Array, "x x"]

@@ -11,6 +11,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+_FARTHEST = math.log(1e4)  # x of what is a ten-thousandth of the way from limit to limit inside one
+
 
 @dataclass(frozen=True)
 class Bounded:
@@ -63,6 +65,11 @@ class Bounded:
             share = (value - self.lower) / (self.upper - self.lower)
         return jnp.log(share) - jnp.log1p(-share)
 
+    def inside(self, value: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """The nearest quantity whose x is a moderate number: limits have none."""
+        least, most = (self.value(jnp.asarray(x, value.dtype)) for x in (-_FARTHEST, _FARTHEST))
+        return jnp.clip(value, least, most)
+
     def slope(self, x: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Derivative of `value`, for the propagation of errors."""
         inner = jax.nn.sigmoid(x) * jax.nn.sigmoid(-x)
@@ -86,6 +93,10 @@ class Unbounded:
 
     def x(self, value: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Number that stands for a quantity."""
+        return value
+
+    def inside(self, value: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+        """The quantity itself."""
         return value
 
     def slope(self, x: Float[Array, "*batch"]) -> Float[Array, "*batch"]:

@@ -23,8 +23,9 @@ def albedo(band: str, sigma: float = 0.01) -> Quantity:
         f"albedo.{band}",
         Bounded(0.0, 1.0),
         _with_albedo,
-        sigma=sigma / 0.09,  # the derivative of the transform is 0.09 at an albedo of 0.1
+        sigma=sigma,
         get=_albedo,
+        sigma_in_units=True,
     )
 
 

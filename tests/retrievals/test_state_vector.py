@@ -252,6 +252,24 @@ def test_priors_are_those_of_the_declarations_or_of_the_states(state):
         vector.prior()
 
 
+def test_an_albedo_is_known_as_well_wherever_it_is(state):
+    """Its error in x grows towards the limits, at which x has no number."""
+    vector = StateVector((aod_550("smoke"), albedo("C01", 0.001)))
+    four = jax.tree.map(lambda x: jnp.broadcast_to(x, (4, *jnp.shape(x))), state)
+    means = np.array([0.0, 0.03, 0.3, np.nan])
+    four.albedo["C01"] = jnp.asarray(means)
+    prior = vector.prior(four).of_pixels(4, vector.names)
+    assert np.isfinite(prior.x_prior).all(axis=1).tolist() == [True, True, True, False]
+    np.testing.assert_allclose(np.sqrt(prior.S_prior[:, 0, 0])[:3], vector.quantities[0].sigma)
+    values = vector.values(jnp.asarray(prior.x_prior))["albedo_C01"]
+    np.testing.assert_allclose(values[:3], means[:3], atol=1.001e-4, rtol=0)
+    np.testing.assert_allclose(values[1:3], means[1:3], rtol=ROUNDING)
+    one = np.array([0.0, 1.0]) * np.sqrt(prior.S_prior[:, 1, 1])[:, None]
+    low, high = (vector.values(jnp.asarray(prior.x_prior + k * one)) for k in (-1e-3, 1e-3))
+    sigma = np.asarray(high["albedo_C01"] - low["albedo_C01"]) / 2e-3
+    np.testing.assert_allclose(sigma[:3], 0.001, rtol=1e-4)
+
+
 def replace_albedo(state, values):
     return StateVector((albedo("C01"),)).state(Bounded(0.0, 1.0).x(values)[:, None], state)
 
