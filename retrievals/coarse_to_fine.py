@@ -27,8 +27,15 @@ from abi_operator.machine.speed import Kept
 
 from .chunks import map_chunks, meanwhile, with_rows
 from .forward import ForwardModel
-from .inverse import Inversion, Minimiser, Pixel, descended
-from .last_steps import chunk_size, finish, in_sigmas, prepare_chord, prepare_to_finish
+from .inverse import Inversion, Minimiser, Pixel
+from .last_steps import (
+    FEWEST_STEPS,
+    chunk_size,
+    finish,
+    in_sigmas,
+    prepare_chord,
+    prepare_to_finish,
+)
 from .observation import Observation
 from .prior import Prior
 from .rounds import minimise
@@ -40,10 +47,8 @@ from that of 8 streams: near enough for a step with its slopes, too far to be th
 COARSE_BUDGET = 1e-3
 """Its error budget: small beside what so few streams leave. [-]"""
 
-_ROUND_STEPS = 2
-"""Steps after which pixels that need more of them go on together, in chunks of their own."""
-
-_NUM_ROUNDS = 6
+_MOST_COARSE = 6
+"""Evaluations of the coarse forward model; after each the pixels that need more go on together."""
 
 # The coarse minimum is near enough after a step of so many posterior standard deviations; and a
 # step from round to round is no longer than one of the prior.
@@ -89,16 +94,15 @@ def minimise_coarsely(
     Parameters
     ----------
     forward, minimiser
-        `coarse` and as of `invert`.
+        `coarse` and as of `invert`; two of the evaluations are left for the last steps.
     inputs
         Priors, measurements and states of the pixels.
     x_first
         Where to begin. [-]
     """
-    how = forward, minimiser._replace(max_steps=_ROUND_STEPS)
-    begin, chunk = partial(_begin_chunk, how), chunk_size(len(x_first))
+    begin, chunk = partial(_begin_chunk, forward), chunk_size(len(x_first))
     begun = map_chunks(begin, *inputs, x_first, chunk=chunk)
-    for _ in range(1, _NUM_ROUNDS):
+    for _ in range(1, min(_MOST_COARSE, minimiser.max_steps - FEWEST_STEPS)):
         rows = np.flatnonzero(~begun.near & np.isfinite(begun.x).all(axis=1))
         if rows.size == 0:
             break
@@ -131,7 +135,8 @@ def minimise_from_coarse(
         begun = minimise_coarsely(first_steps, minimiser, inputs, x_first)
         x, jacobian = np.asarray(begun.x), np.asarray(begun.jacobian)
         prepare_chord(forward, inputs, x, jacobian)
-    solutions = finish(forward, inputs, x, jacobian, np.asarray(begun.num_steps))
+    num_steps = np.asarray(begun.num_steps)
+    solutions = finish(forward, inputs, x, jacobian, num_steps, minimiser.max_steps)
     rows = np.flatnonzero(~np.isfinite(solutions.cost))  # few streams may not have been a number
     if rows.size == 0:
         return solutions
@@ -143,21 +148,19 @@ def minimise_from_coarse(
 
 @Kept
 def _begin_chunk(
-    how: tuple[ForwardModel, Minimiser],
+    forward: ForwardModel,
     prior: Prior,
     observations: Observation,
     states: State,
     x_first: jax.Array,
 ) -> Begun:
-    forward, minimiser = how
-
     def of_one(prior: Prior, observation: Observation, state: State, x: Array) -> Begun:
         pixel = Pixel.of(forward, observation, state, x, prior)
-        here, num_steps, _ = descended(pixel, pixel.z(x), minimiser, _NEAR)
+        here = pixel.linear(pixel.z(x))
         step = here.step
         length = jnp.sqrt(jnp.sum(step**2))
         step = step * jnp.minimum(1, _LONGEST / jnp.where(length > 0, length, 1))
         near = in_sigmas(here.jacobian, here.step) < _NEAR
-        return Begun(pixel.x(here.z + step), here.jacobian, num_steps, near)
+        return Begun(pixel.x(here.z + step), here.jacobian, jnp.ones((), int), near)
 
     return jax.vmap(of_one)(prior, observations, states, x_first)

@@ -43,10 +43,12 @@ class Minimiser(NamedTuple):
         Largest change of x, whitened by its prior where there is one, and of the cost, in the last
         step; relative where these are above 1. Convergence being quadratic, what is left is far
         smaller, so that with a prior 1e-2 moves nothing beside the posterior error. None for 1e-2
-        with a prior and 1e-6 without. [-]
+        with a prior and 1e-6 without. Larger ones than 1e-2 are no looser with `coarse_to_fine`,
+        whose last step is below 0.05 posterior standard deviations. [-]
     max_steps
-        Evaluations of the forward model with its Jacobian that are allowed; many pixels together
-        are given these in rounds of 8, the last one whole. [-]
+        Evaluations of the forward model that are allowed, with its Jacobian; many pixels together
+        are given these in rounds of 8, the last one whole. With `coarse_to_fine` those of both
+        forward models, three at least; two fifths of them may be damped steps. [-]
     solver
         One of `SOLVERS`. Of 2,048 random pixels of smoke at 4 streams, three unknowns from C01 to
         C03, dogleg explained 99.9 % and Levenberg-Marquardt 97.0, in 12 and 22 steps.
@@ -61,7 +63,8 @@ class Minimiser(NamedTuple):
         the truth are told to have another (`benchmarks/retrievals_against_truth.py`).
     coarse_to_fine
         Whether with a prior the scan and the first steps are by fewer streams (`coarse_to_fine`);
-        not where the tolerance is below 1e-2.
+        not where the tolerance is below 1e-2. All these steps are of Gauss and Newton, damped where
+        that is needed, whatever the `solver`.
     """
 
     tolerance: float | None = None

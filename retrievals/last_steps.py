@@ -21,7 +21,7 @@ from abi_operator.machine.speed import Kept
 
 from .chunks import map_chunks, with_rows
 from .forward import ForwardModel
-from .inverse import Inversion, Linear, Pixel
+from .inverse import DEFAULT_MINIMISER, Inversion, Linear, Pixel
 from .observation import Observation
 from .prior import Prior
 from .rounds import Inputs
@@ -30,7 +30,10 @@ _LAST_STEP = 0.05
 """Largest step that may be the last, in posterior standard deviations. What is left is the square
 of it times the forward model's curvature, which is below 1 where error bars mean anything."""
 
-_MOST_DAMPED = 16  # steps, which few pixels need; where they are not enough, that is the result
+FEWEST_STEPS = 2
+"""Evaluations that all pixels take: a chord and a tangent."""
+
+_MOST_DAMPED = 0.4  # share of all steps, which few pixels need
 
 _MANY = 256  # pixels a chunk, where there are as many: to begin and to end one takes milliseconds
 
@@ -58,6 +61,7 @@ def finish(
     x: np.ndarray,
     jacobian: np.ndarray,
     num_steps: np.ndarray,
+    max_steps: int = DEFAULT_MINIMISER.max_steps,
 ) -> Inversion:
     """Take the last steps; `converged` where the very last is small.
 
@@ -71,20 +75,22 @@ def finish(
         Where they have come to, and slopes of all residuals in z that are right nearly. [-]
     num_steps
         Evaluations so far. [-]
+    max_steps
+        How many there may be in all, of which two are taken anyway. [-]
     """
     chunk = chunk_size(len(x))
     chord, tangent = partial(_chord_chunk, forward), partial(_tangent_chunk, forward)
     moved = map_chunks(chord, *inputs, x, jacobian, chunk=chunk)
     found = map_chunks(tangent, *inputs, moved.x, chunk=chunk)
-    found = eqx.tree_at(lambda f: f.inversion.num_steps, found, num_steps + 2)
-    rows = _left(found)
+    found = eqx.tree_at(lambda f: f.inversion.num_steps, found, num_steps + FEWEST_STEPS)
+    rows = _left(found, max_steps)
     if rows.size:
         some, before = jax.tree.map(lambda x: x[rows], (inputs, found))
         x = before.inversion.x
         moved = map_chunks(chord, *some, x, before.here.jacobian, chunk=chunk)
         after = eqx.tree_at(lambda f: f.inversion, before, _after_chord(before.inversion, moved))
         found = jax.tree.map(partial(with_rows, rows), found, after)
-    return _damped(partial(map_chunks, tangent, chunk=chunk), inputs, found)
+    return _damped(partial(map_chunks, tangent, chunk=chunk), inputs, found, max_steps)
 
 
 def _after_chord(before: Inversion, moved: Moved) -> Inversion:
@@ -102,12 +108,15 @@ def _after_chord(before: Inversion, moved: Moved) -> Inversion:
 
 
 def _damped(
-    tangent: Callable[..., Found], inputs: tuple[Prior, Observation, State], found: Found
+    tangent: Callable[..., Found],
+    inputs: tuple[Prior, Observation, State],
+    found: Found,
+    max_steps: int,
 ) -> Inversion:
     """Go on with the pixels that have not converged, by Levenberg's damped steps."""
     damping = np.zeros(len(found.inversion.x))
-    for _ in range(_MOST_DAMPED):
-        rows = _left(found)
+    for _ in range(int(_MOST_DAMPED * max_steps)):
+        rows = _left(found, max_steps)
         if rows.size == 0:
             break
         some, before = jax.tree.map(lambda x, rows=rows: x[rows], (inputs, found))
@@ -127,10 +136,11 @@ def _damped(
     return found.inversion
 
 
-def _left(found: Found) -> np.ndarray:
+def _left(found: Found, max_steps: int) -> np.ndarray:
     """Pixels that have not converged, and may."""
     inversion = found.inversion
-    return np.flatnonzero(~inversion.converged & np.isfinite(inversion.cost))
+    left = ~inversion.converged & (inversion.num_steps < max_steps)
+    return np.flatnonzero(left & np.isfinite(inversion.cost))
 
 
 def _chosen(choice: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -81,6 +81,18 @@ def test_however_rough_the_first_steps_are_the_minimum_is_the_same(pixels, from_
     np.testing.assert_allclose(found.prior_cost, np.sum(departure**2, axis=1), rtol=1e-9)
 
 
+@pytest.mark.parametrize("max_steps", [1, 5, 8])
+def test_steps_are_no_more_than_are_allowed(pixels, max_steps):
+    """But for three, of which the last gives the covariance."""
+    observation, ground, prior, _ = pixels
+    _, usable, own = checked(TWO, observation, prior)
+    whole, rough, states = OfPair(TWO.vector), Rough(TWO.vector), (ground, np.full((12, 1), OFF[0]))
+    how = Minimiser(max_steps=max_steps).chosen(True)
+    found = minimise_from_coarse(rough, whole, how, (own, usable, states), own.x_prior)
+    assert found.num_steps.max() == max(max_steps, 3)
+    assert not found.converged.all()
+
+
 def test_the_coarse_model_is_cheaper_or_none():
     forward = ForwardModel(plume("smoke"), BANDS, num_streams=8, num_doublings=3)
     rough = coarse(forward)
