@@ -86,8 +86,8 @@ def finish(
     rows = _left(found, max_steps)
     if rows.size:
         some, before = jax.tree.map(lambda x: x[rows], (inputs, found))
-        x = before.inversion.x
-        moved = map_chunks(chord, *some, x, before.here.jacobian, chunk=chunk)
+        there = before.inversion.x, before.here.jacobian
+        moved = map_chunks(chord, *some, *there, chunk=chunk)
         after = eqx.tree_at(lambda f: f.inversion, before, _after_chord(before.inversion, moved))
         found = jax.tree.map(partial(with_rows, rows), found, after)
     return _damped(partial(map_chunks, tangent, chunk=chunk), inputs, found, max_steps)
@@ -98,8 +98,8 @@ def _after_chord(before: Inversion, moved: Moved) -> Inversion:
     num_bands = moved.left.shape[1] - moved.x.shape[1]
     measurement, prior = np.split(np.asarray(moved.left) ** 2, [num_bands], axis=1)
     near = np.asarray(moved.near)
-    found = moved.x, measurement.sum(axis=1), prior.sum(axis=1)
-    then = before.x, before.measurement_cost, before.prior_cost
+    found = np.asarray(moved.x), measurement.sum(axis=1), prior.sum(axis=1)
+    then = map(np.asarray, (before.x, before.measurement_cost, before.prior_cost))
     return eqx.tree_at(
         lambda i: (i.x, i.measurement_cost, i.prior_cost, i.num_steps, i.converged),
         before,

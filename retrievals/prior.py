@@ -66,7 +66,7 @@ class Prior(eqx.Module):
                     f"{own}, or {(num_pixels, *own)} for a prior of each pixel."
                 )
         if covariance.ndim == 3:
-            unknown = ~np.isfinite(covariance).all(axis=(1, 2))
+            unknown = np.asarray(~np.isfinite(covariance).all(axis=(1, 2)))
             covariance = np.where(unknown[:, None, None], np.eye(size), covariance)
             mean = np.where(unknown[:, None], np.nan, mean)
         elif not np.isfinite(covariance).all():
