@@ -135,12 +135,12 @@ def invert(
     prior: Prior | None = None,
     minimiser: Minimiser = DEFAULT_MINIMISER,
 ) -> Inversion:
-    """Find x at one pixel; never raises for values.
+    """Find x at one pixel; what that measures and how the column is never raises.
 
     Parameters
     ----------
     forward
-        The forward model.
+        The forward model, with enough doublings (`prepared`).
     observation, state
         What was measured, and all that is known of the column. A state that is not finite ends in
         an inversion that is not `converged`.
@@ -150,6 +150,16 @@ def invert(
         What is known of x beforehand, of this pixel.
     minimiser
         How, and when to end.
+
+    Returns
+    -------
+    Inversion
+        Where it ended; of a pixel that has not `converged`, too.
+
+    Raises
+    ------
+    ValueError
+        Where the minimiser is none (`Minimiser.chosen`).
     """
     how = minimiser.chosen(prior is not None)
     tolerance = max(how.tolerance or 0.0, _smallest_tolerance(x_first.dtype))

@@ -3,13 +3,13 @@ r"""A whole image at once: neighbours are alike, and what one measures tells of 
 With z, x whitened by the prior of single pixels (`inverse`), each of its elements is a field over
 the pixels, of which the prior is one of Matern's with smoothness 1: its precision over a grid is
 
-.. math:: Q = c\,(1 - \ell^2 \Delta)^2
+.. math:: Q = D\,(1 - \ell^2 \Delta)^2 D
 
 (F. Lindgren, H. Rue and J. Lindstrom [1]_, section 2.2), with the Laplacian :math:`\Delta` over
 neighbours in x and y, the correlation length :math:`\ell` in pixels, at which the correlation has
-fallen to 0.60 (0.58 on a grid of three pixels a length), and c such that the variance is 1 amid a
-large image: single pixels keep their own prior. Next to pixels that are not retrieved the slope is
-zero and the variance larger.
+fallen to 0.60 (0.58 on a grid of three pixels a length), and D diagonal such that the variance of
+every pixel is 1: single pixels keep their own prior, alone and at an edge as amid a large image.
+Next to pixels that are not retrieved the slope of D z is zero.
 
 Minimised is the sum over all pixels,
 
@@ -22,7 +22,7 @@ A's diagonal blocks, ask for products with it.
 
 The diagonal blocks of the posterior covariance :math:`A^{-1}` are estimated from draws s of it,
 
-.. math:: A s = J^T \epsilon + Q^{1/2} \eta, \qquad
+.. math:: A s = J^T \epsilon + D (1 - \ell^2 \Delta) \eta, \qquad
    A^{-1}_{pp} \approx A_{pp}^{-1} + \overline{m_p m_p^T}, \qquad
    m_p = -A_{pp}^{-1} (A s - A_{pp} s)_p,
 

@@ -27,7 +27,7 @@ def system(
     """Products with A, the inverses of its diagonal blocks, and these; damped by shares of them."""
     normal = jnp.einsum("pbx,pby->pxy", here.jacobian, here.jacobian)
     unit = jnp.eye(normal.shape[-1], dtype=normal.dtype)
-    blocks = normal + smooth.diagonal(len(normal))[:, None, None] * unit
+    blocks = normal + smooth.diagonal()[:, None, None] * unit
     damped = normal + damping * blocks
 
     def matrix(v: Float[Array, "pixel x"]) -> Float[Array, "pixel x"]:
@@ -67,7 +67,7 @@ def posterior_blocks(here: Linearised, smooth: Smoothness, key: Array) -> Float[
         one, two = jax.random.split(key)
         noise = jax.random.normal(one, here.residual.shape, here.residual.dtype)
         field = jax.random.normal(two, blocks.shape[:2], blocks.dtype)
-        right = jnp.einsum("pbx,pb->px", here.jacobian, noise) + smooth.root(field)
+        right = jnp.einsum("pbx,pb->px", here.jacobian, noise) + smooth.transposed_root(field)
         draw = solved(matrix, inverse_blocks, right)
         others = matrix(draw) - jnp.einsum("pxy,py->px", blocks, draw)
         return -jnp.einsum("pxy,py->px", inverse_blocks, others)

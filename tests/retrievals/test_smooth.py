@@ -64,7 +64,7 @@ def test_single_pixels_keep_their_own_prior():
     smooth = smoothness(np.ones((31, 31), bool), LENGTH)
     matrix = precision(smooth, 961)
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
-    np.testing.assert_allclose(smooth.diagonal(961), np.diagonal(matrix), rtol=1e-12)
+    np.testing.assert_allclose(smooth.diagonal(), np.diagonal(matrix), rtol=1e-12)
     covariance = np.linalg.inv(matrix).reshape(31, 31, 31, 31)[15, 15]
     # Five lengths from the edges, where the rest of the correlation is 2 %.
     assert covariance[15, 15] == pytest.approx(1, abs=1e-3)
@@ -76,6 +76,24 @@ def test_single_pixels_keep_their_own_prior():
         expected = np.mean(spectrum * np.cos(lag * wave)) / np.mean(spectrum)
         assert covariance[15, 15 + lag] == pytest.approx(expected, abs=2e-3)
         assert expected == pytest.approx(matern, abs=0.03)
+
+
+@pytest.mark.parametrize("length", [1.5, 10.0])
+def test_a_small_patch_keeps_it_too(length):
+    """A pixel alone, two, a row and a corner: they had up to 35 times its standard deviation."""
+    chosen = np.zeros((9, 12), bool)
+    chosen[0, 0] = chosen[2, 4:6] = chosen[4, :11] = chosen[6:, 3] = chosen[8, 3:7] = True
+    matrix = precision(smoothness(chosen, length), chosen.sum())
+    np.testing.assert_allclose(np.diagonal(np.linalg.inv(matrix)), 1, rtol=1e-6)
+
+
+def test_a_large_patch_keeps_it_nearly(monkeypatch):
+    """By draws, to four of their standard errors, 0.044 in a standard deviation."""
+    exact = smoothness(np.ones((20, 20), bool), LENGTH).sigma
+    monkeypatch.setattr("retrievals.smooth.precision._MOST_EXACT", 10)
+    drawn = smoothness(np.ones((20, 20), bool), LENGTH).sigma
+    ratio = np.asarray(drawn / exact)
+    assert 0.01 < np.abs(ratio - 1).max() < 4 * 0.044
 
 
 def test_neighbours_are_those_that_are_retrieved():
@@ -149,7 +167,7 @@ def test_what_is_no_number_any_more_is_not_won():
     """The measurement of the second of three pixels leads beyond the edge."""
     sigma = np.full((3, 1), 0.1)
     observation, ground = Observation(np.array([[0.5], [1.5], [0.5]]), sigma), np.zeros((3, 1))
-    smooth, prior = smoothness(np.ones((1, 3), bool), 1.0), Prior(np.zeros(1), np.eye(1))
+    smooth, prior = smoothness(np.ones((1, 3), bool), 0.3), Prior(np.zeros(1), np.eye(1))
     _, usable, own = checked(Edge(), observation, prior)
     linearise = partial(linearised, Edge(), usable, ground, own)
     z, here, _, _ = _descended(linearise, smooth, np.zeros((3, 1)), 1e-2, 5)
