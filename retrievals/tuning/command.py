@@ -53,8 +53,8 @@ def tune(
         bool,
         typer.Option(
             "--brf",
-            help="Observed numbers were divided by the cosine of the solar zenith angle, which "
-            "those of ABI's files were not.",
+            help="Observed numbers were divided by the cosine of the solar zenith angle, where "
+            "their names do not say; those of results and of ABI's files were not.",
         ),
     ] = False,
     where: Annotated[
