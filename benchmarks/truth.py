@@ -7,7 +7,7 @@ and fire, as many of each, in seven bands with all gases, sun to 78 and view to 
 zenith. What a scene gives of them by default (`radiance`: sunlight, and emission in C07 and where
 there are fires) stands beside the same optics at many streams, with phase functions of Mie theory
 for droplets: their moments as many as streams need, and exact single scattering of the
-whole phase function. "Before" is the same with `--cloud-optics mitchell`, against the same truth.
+whole phase function; then the same with `--cloud-optics mitchell`, against the same truth.
 
 Errors are relative, in C01-C06 to no less than what a ground of albedo `FLOOR` would send up. Per
 cent: median, 99th percentile, largest. `--check` exits with 1 where the goals are missed: 99 of 100
@@ -140,7 +140,7 @@ def main():
     new, old = LIQUID_OPTICS
     states, kinds = make_states(options.columns, SEED, new)
     truth = solved(states, num_streams=options.truth_streams, num_modes=options.truth_modes)
-    for title, optics in ((f"Defaults (cloud optics {new})", new), (f"Before ({old})", old)):
+    for title, optics in ((f"Defaults (cloud optics {new})", new), (f"With `--cloud-optics {old}`", old)):
         given, _ = make_states(options.columns, SEED, optics)
         error = relative_error(solved(given), truth, states)
         report(title, error, kinds)
