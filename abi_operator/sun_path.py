@@ -49,4 +49,5 @@ def sun_secant(
     flat = 1 / mu0
     x = jnp.clip((solar_zenith - FLAT_ZENITH) / (SPHERICAL_ZENITH - FLAT_ZENITH), 0, 1)
     share = x * x * (3 - 2 * x)
-    return flat + share * (slant_path_secant(height, mu0, tau=tau) - flat)
+    # No difference of the two: near the horizon the sphere's is lost beside 1 / mu0.
+    return (1 - share) * flat + share * slant_path_secant(height, mu0, tau=tau)

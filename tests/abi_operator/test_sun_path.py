@@ -84,6 +84,27 @@ def test_it_begins_smoothly():
     np.testing.assert_allclose(*secants(jnp.asarray(1.3)), rtol=1e-14)
 
 
+def test_it_is_that_of_the_sphere_down_to_the_horizon():
+    """In single precision, where 1 / mu0 is 30,000 times the sphere's secant."""
+    height = jnp.asarray(HEIGHT, jnp.float32)
+    tau = jnp.ones((1, HEIGHT.size - 1), jnp.float32)
+    zenith = jnp.asarray(np.radians(89.9999), jnp.float32)
+
+    @jax.jit
+    @jax.value_and_grad
+    def blended(zenith):
+        return sun_secant(height, zenith, tau)[0, 0]
+
+    @jax.jit
+    @jax.value_and_grad
+    def sphere(zenith):
+        return slant_path_secant(height, jnp.cos(zenith), tau=tau)[0, 0]
+
+    found, expected = blended(zenith), sphere(zenith)
+    assert expected[1] > 0
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
 def test_slopes_are_those_of_differences():
     """By the sun's angle and by a plume's extinction, forwards and backwards."""
     state = columns([68.0], True, {"smoke": smoke(0.5, bands=NAMES)})

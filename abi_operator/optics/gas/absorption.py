@@ -34,7 +34,8 @@ def gas_absorption(
     Parameters
     ----------
     atmosphere
-        One column; without `Gases` nothing absorbs. Temperature is read in C04.
+        One column; without `Gases` nothing absorbs. Temperature is read for vapour
+        in C04, C06 and C07.
     band
         One of `BANDS`.
     gases
