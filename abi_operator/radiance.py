@@ -5,7 +5,7 @@ simulated as radiance. Sunlight and emission are one solve.
 """
 
 from collections.abc import Sequence
-from typing import Unpack
+from typing import Any, Unpack
 
 import jax.numpy as jnp
 import numpy as np
@@ -25,6 +25,12 @@ THERMAL = ("C07",)
 FIRE_BANDS = ("C05", "C06", "C07")
 """Bands whose emission is simulated where there is a fire: without, C05 and C06 get no more than
 4e-5 of the sun's light from a ground of 300 K."""
+
+# Temperature of the ground up to which nothing has to shine in C05 and C06: there it would give C06
+# 9e-4 of the sun's light from a white ground, and C05 1e-6. [K]
+_WARMEST_WITHOUT_FIRE = 350.0
+# Distances that the sun has, and some more. [AU]
+_SUN_DISTANCE = 0.9, 1.1
 
 
 @with_keywords(ByName, Settings())
@@ -51,7 +57,7 @@ def radiance(
         Names of the bands, each present in the state's albedo and plumes. C07 needs temperatures
         of the levels and of the ground; so do C05 and C06 where there is a fire.
     sun_distance
-        Distance of the sun. [AU]
+        Distance of the sun, one for all columns or one each, 0.9 to 1.1. [AU]
     **settings
         Satellite, gases and accuracy: the fields of `Settings`.
 
@@ -63,7 +69,9 @@ def radiance(
     ------
     ValueError
         As `brf`, and if a temperature is missing, the satellite unknown, or the fit of gas
-        absorption not made for the satellite's band (C04 of GOES-19).
+        absorption not made for the satellite's band (C04 of GOES-19); if distances of the sun are
+        not those of the batch or, where they can be read, out of range; and where in C05 or C06 a
+        ground above 350 K would not shine, as there is no fire.
     """
     how = settings_of(settings)
     bands = checked_bands(state, bands, how.gases, how.satellite)
@@ -81,6 +89,7 @@ def radiance(
     state, _ = uniform(state)
     if is_concrete(state):
         check_state(state)
+        _refuse_hot_ground(state, bands)
     mu0 = state.geometry.mu0
     sun = sunlight(mu0, bands, how.satellite, sun_distance)
     options = Options(bands, tuple(emitting), how)
@@ -106,9 +115,50 @@ def sunlight(
         Names.
     sun_distance
         Distance of the sun. [AU]
+
+    Raises
+    ------
+    ValueError
+        If distances are not those of the batch or, where they can be read, out of range.
     """
-    share = jnp.where(mu0 > 0, 1 / jnp.asarray(sun_distance, mu0.dtype) ** 2, 0)
+    _check_sun_distance(sun_distance, mu0.shape)
+    distance = jnp.broadcast_to(jnp.asarray(sun_distance, mu0.dtype), mu0.shape)
+    share = jnp.where(mu0 > 0, 1 / distance**2, 0)
     return {x: solar_irradiance(x, satellite) * share for x in bands}
+
+
+def _check_sun_distance(distance: Any, batch: tuple[int, ...]) -> None:
+    """Refuse distances that are not one for all columns or one each, or not those of the sun."""
+    shape = np.shape(distance)
+    if len(shape) > len(batch) or any(
+        n not in (1, m) for n, m in zip(shape[::-1], batch[::-1], strict=False)
+    ):
+        raise ValueError(
+            f"sun_distance has shape {shape}, but solar_zenith has {batch}: allowed is one number, "
+            "or one for each column."
+        )
+    if not is_concrete(distance):
+        return
+    x, (low, high) = np.asarray(distance), _SUN_DISTANCE
+    bad = ~((x >= low) & (x <= high))
+    if bad.any():
+        raise ValueError(
+            f"sun_distance is {x[bad].flat[0]}; allowed is {low:g} to {high:g} AU (in AU, not km)."
+        )
+
+
+def _refuse_hot_ground(state: State, bands: Sequence[str]) -> None:
+    """Refuse a ground that shines in bands of which the emission is not simulated."""
+    dark = [x for x in bands if x in FIRE_BANDS and x not in THERMAL]
+    if state.fire is not None or state.surface_temperature is None or not dark:
+        return
+    warmth = np.asarray(state.surface_temperature)
+    if np.any(warmth > _WARMEST_WITHOUT_FIRE):
+        raise ValueError(
+            f"state.surface_temperature is {warmth.max():g} K, and without a fire no emission is "
+            f"simulated in {dark}: allowed is {_WARMEST_WITHOUT_FIRE:g} K at most. Give "
+            "state.fire = Fire(fraction=0, temperature=...), or leave these bands out."
+        )
 
 
 def of_white_ground(

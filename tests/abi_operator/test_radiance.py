@@ -22,6 +22,7 @@ from abi_operator.bands import BANDS
 from abi_operator.instrument import range_ceiling
 from abi_operator.optics import gas_absorption, rayleigh, transmittance
 from abi_operator.planck import brightness_temperature, in_band_radiance
+from abi_operator.radiance import sunlight
 from abi_operator.satellites import solar_irradiance
 
 LEVELS = np.linspace(30e3, 0.0, 9)
@@ -169,6 +170,40 @@ def test_refused():
         radiance(make_state(), ("C04",), satellite="GOES-19")
     with pytest.raises(ValueError, match="GOES-20"):
         radiance(make_state(), ("C01",), satellite="GOES-20")
+
+
+@pytest.mark.parametrize(
+    ("distance", "message"),
+    [
+        (np.ones((2, 1)), r"has shape \(2, 1\), but solar_zenith has \(2,\): allowed is one number"),
+        (np.ones(3), r"has shape \(3,\), but"),
+        (1.496e8, r"is 149600000\.0; allowed is 0\.9 to 1\.1 AU"),
+        (np.array([1.0, 0.0]), r"is 0\.0; allowed"),
+        (jnp.asarray([jnp.nan, 1.0]), "is nan; allowed"),
+    ],
+)
+def test_distances_of_the_sun_are_checked(distance, message):
+    with pytest.raises(ValueError, match="^sun_distance " + message):
+        radiance(stacked([make_state()] * 2), SEEN, sun_distance=distance, **OPTIONS)
+
+
+def test_each_column_has_its_own_sun():
+    mu0, distance = np.array([0.5, 0.8, -0.1]), np.array([0.983, 1.017, 1.0])
+    expected = solar_irradiance("C01", "GOES-16") * np.array([0.983**-2, 1.017**-2, 0.0])
+    for one in (distance, jnp.asarray(distance)):
+        found = sunlight(jnp.asarray(mu0), ("C01",), "GOES-16", one)["C01"]
+        np.testing.assert_allclose(found, expected, rtol=1e-14)
+    for one in (1.0, np.ones(1)):
+        assert sunlight(jnp.asarray(mu0), ("C01",), "GOES-16", one)["C01"].shape == (3,)
+
+
+def test_a_hot_ground_needs_a_fire_to_shine_in_c06():
+    hot = make_state(surface_temperature=jnp.asarray(800.0))
+    message = r"is 800 K, and without a fire .* in \['C06'\]: allowed is 350 K .* Fire\(fraction=0"
+    with pytest.raises(ValueError, match=message):
+        radiance(stacked([make_state(), hot]), SEEN, **OPTIONS)
+    told = dataclasses.replace(hot, fire=Fire(jnp.asarray(0.0), jnp.asarray(900.0)))
+    assert np.all(seen(told, told)["C06"] > 100 * seen(make_state(), make_state())["C06"])
 
 
 def test_eight_bands_and_their_gases():
