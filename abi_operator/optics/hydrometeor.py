@@ -140,8 +140,9 @@ def outside_fitted_range(
 
     Fitted are effective radii of 1.74-59 um for the liquid cloud by Mie theory and 2-50 um for one
     by ``"mitchell"`` and the class of that kind, 20-2000 um for rain, and generalized effective
-    sizes of 20-130 um for ice by Fu (1996), effective radii of 5-60 um for rough ice. Where the
-    asymmetry factor is a given number just the limits of the class count.
+    sizes of 20-130 um for ice by Fu (1996), effective radii of 5-60 um for the asymmetry factor of
+    rough ice; of a class that uses several fits, sizes that all of them cover. Where the asymmetry
+    factor is a given number just the limits of the class count.
 
     Parameters
     ----------
@@ -271,14 +272,15 @@ def _of_radius(
 def _fitted_radii(optics: ClassOptics) -> tuple[float, float]:
     """Effective radii for which what a class uses was fitted. [m]"""
     kind = optics.asymmetry if isinstance(optics.asymmetry, str) else "given"
+    fits = []
     if kind == "droplets":
-        return 1e-6 * water.EFFECTIVE_RADIUS_UM[0], 1e-6 * water.EFFECTIVE_RADIUS_UM[-1]
+        fits.append((water.EFFECTIVE_RADIUS_UM[0], water.EFFECTIVE_RADIUS_UM[-1]))
     if kind == "rain":
-        return 1e-6 * rain.EFFECTIVE_RADIUS_UM[1], 1e-6 * rain.EFFECTIVE_RADIUS_UM[-1]
+        fits.append((rain.EFFECTIVE_RADIUS_UM[1], rain.EFFECTIVE_RADIUS_UM[-1]))
     if kind == "baum2014":
-        radii_um = rough_ice.EFFECTIVE_RADIUS_UM
-        return 1e-6 * radii_um[0], 1e-6 * radii_um[-1]
+        fits.append((rough_ice.EFFECTIVE_RADIUS_UM[0], rough_ice.EFFECTIVE_RADIUS_UM[-1]))
     if "fu1996" in (kind, optics.efficiencies):
-        lower, upper = (1e-6 * size * 3 / (4 * SIZE_PER_PATH) for size in FU_RANGE_UM)
-        return lower, upper
-    return optics.smallest_radius, optics.largest_radius
+        fits.append(tuple(size * 3 / (4 * SIZE_PER_PATH) for size in FU_RANGE_UM))
+    if not fits:
+        return optics.smallest_radius, optics.largest_radius
+    return 1e-6 * max(low for low, _ in fits), 1e-6 * min(high for _, high in fits)

@@ -14,6 +14,7 @@ from abi_operator.atmosphere import Hydrometeor
 from abi_operator.bands import BANDS, several_bands
 from abi_operator.optics import from_effective_radius, hydrometeor, outside_fitted_range
 from abi_operator.optics.diffraction import diffracted_share, diffraction_asymmetry
+from abi_operator.optics.hydrometeor_classes import CLASSES
 from abi_operator.optics.ice import SIZE_PER_PATH, ice_asymmetry, ice_coalbedo
 from abi_operator.optics.ice_tables import FU
 from abi_operator.optics.rough_ice import rough_ice_geometric_asymmetry
@@ -119,6 +120,20 @@ def test_rough_is_for_crystals_alone_and_flagged_beyond_its_sizes(make_atmospher
     tau = hydrometeor(cloud, "ice", BANDS["C02"]).tau[0]
     share = outside_fitted_range(cloud, BANDS["C02"])
     np.testing.assert_allclose(share, tau[3] / tau.sum(), rtol=1e-12)
+
+
+def test_rough_ice_is_fitted_where_both_of_its_fits_are(make_atmosphere):
+    """By its asymmetry factor from 5 to 60 um, by Fu's extinction and absorption from 13 to 84 um."""
+
+    def share(efficiencies):
+        optics = CLASSES["ice"]._replace(asymmetry="baum2014", efficiencies=efficiencies)
+        return outside_fitted_range(cloud, BANDS["C02"], CLASSES | {"ice": optics})
+
+    cloud = ice(make_atmosphere, [8.0] * 4, "fu")
+    cloud = dataclasses.replace(
+        cloud, liquid=dataclasses.replace(cloud.liquid, mass_path=jnp.zeros(4))
+    )
+    assert share("mitchell") == 0 and share("fu1996") == 1
 
 
 def test_the_derivative_by_size_is_that_of_differences(make_atmosphere):
