@@ -30,6 +30,9 @@ KERNELS = {"volume_kernel_weight": 1, "geometric_kernel_weight": 2}
 _PARAMETERS, _QUALITY = VARIABLE_MAP
 _GRID = ("time", "lat", "lon")
 _NO_INVERSION = 255
+# Regressions have constants, and dark ground may fall below 0 by them: down to here, two standard
+# errors of the one for C06 and five of that for C05, it is black. [-]
+_LOWEST_BLACK = -0.005
 _ADVICE = (
     "request MCD43A1 from AppEEARS as an area sample in NetCDF-4 with the projection Geographic"
 )
@@ -111,8 +114,9 @@ def read_mcd43a1(
     -------
     xarray.Dataset
         ``surface_albedo`` (band, time, lat, lon) [-], NaN where the file has none; attributes
-        count valid inversions that were made NaN because their albedo lies outside 0..1
-        (``num_outside_unit_interval``), and kernel weights outside the file's valid range
+        count valid inversions that were held at 0 because the regression gave -0.005 or more, but
+        less than 0 (``num_held_at_zero``), that were made NaN because it gave what else is outside
+        0..1 (``num_outside_unit_interval``), and kernel weights outside the file's valid range
         (``num_outside_valid_range``). ``albedo_quality``, same dimensions, uint8: the worst
         mandatory quality among the MODIS bands used; 0 full inversion, 1 magnitude inversion, 255
         none. ``volume_kernel_weight`` and ``geometric_kernel_weight``, likewise, of `kernels`: by
@@ -130,9 +134,12 @@ def read_mcd43a1(
         [r.offset + sum(w * white_sky[n] for n, w in r.weights.items()) for r in regressions]
     )
     worst = np.stack([np.maximum.reduce([quality[n] for n in r.weights]) for r in regressions])
+    held = (albedo >= _LOWEST_BLACK) & (albedo < 0)
+    albedo[held] = 0.0
     outside = (albedo < 0) | (albedo > 1)
     albedo[outside] = np.nan
     albedo_attributes = cf_attributes("surface_albedo") | {
+        "num_held_at_zero": int(held.sum()),
         "num_outside_unit_interval": int(outside.sum()),
         "num_outside_valid_range": num_invalid,
         "comment": "; ".join(

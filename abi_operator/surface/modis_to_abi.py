@@ -43,7 +43,7 @@ def modis_to_abi(modis: Mapping[str, Float[Array, "*n"]], band: str) -> Float[Ar
     The regressions know vegetation and soil. They do not hold for snow, whose albedo falls steeply
     between the near-infrared bands (at 2.24 um it is about 0.07, at 2.13 um about 0.02 [1]_), nor
     for burnt or flooded ground without a check. What they give is not clipped: C05 falls below 0
-    where Band5 is above 23 times Band6.
+    where Band6 is below 0.002 plus 0.043 times Band5, as it may be over clear water.
 
     The f_iso of kernel weights follow the same line, their f_vol and f_geo the same without its
     constant, as all three weights enter an albedo linearly.

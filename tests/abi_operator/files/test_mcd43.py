@@ -89,6 +89,25 @@ def test_albedo_outside_0_to_1_is_made_nan_and_counted(write_albedo_twin):
     assert albedo.attrs["num_outside_unit_interval"] == 2
 
 
+def test_dark_ground_is_black_where_a_regression_falls_below_0(write_albedo_twin):
+    """C05 of a black ground is the constant, -0.0021; of 0.1 in Band5 it is -0.0066, too little."""
+    band5, band6 = weights(0), weights(0)
+    band5[0, 0, 1] = [100, 0, 0]
+    band5[0, 0, 2] = [300, 0, 0]
+    band6[0, 0, 2] = [300, 20, 10]
+    path = write_albedo_twin({"Band5": band5, "Band6": band6})
+    dataset = read_mcd43a1(path, ["C05"], kernels=True).sel(band="C05")
+    expected = np.zeros((2, 2, 3))
+    expected[0, 0, 1] = np.nan
+    expected[0, 0, 2] = 1.043 * white_sky(0.3, 0.02, 0.01) - 0.045 * 0.3 - 0.0021
+    albedo = dataset["surface_albedo"]
+    np.testing.assert_allclose(albedo, expected, rtol=ROUNDING)
+    kernel = dataset["volume_kernel_weight"]
+    np.testing.assert_array_equal(np.isnan(kernel), np.isnan(expected))
+    assert albedo.attrs["num_held_at_zero"] == 10
+    assert albedo.attrs["num_outside_unit_interval"] == 1
+
+
 def test_weights_outside_the_valid_range_are_made_nan_and_counted(write_albedo_twin):
     packed = weights(300)
     packed[0, 1, 1, 1] = -3
