@@ -16,6 +16,9 @@ from ...constants import STANDARD_PRESSURE
 from ..pointwise import choose, pointwise
 
 _GRAVITY = 9.80665  # standard [m s-2]
+# Temperatures between which parabolas are believed [K]; beyond, they are those of temperatures that
+# bend, by this much at most in units of 250 K: no further than 100 and 400 K, where all are above 0.
+_BELIEVED, _BEND = (150.0, 325.0), (0.2, 0.3)
 
 
 def ozone_column(atmosphere: Atmosphere) -> Float[Array, " layer"]:
@@ -108,6 +111,9 @@ class WarmVapour(NamedTuple):
     .. math:: u_k \left(\frac{p}{p_0}\right)^n (1 + a x + b x^2), \qquad
        x = \frac{T - 250\ \mathrm{K}}{250\ \mathrm{K}}
 
+    The parabolas were fitted to air. Below 150 K and above 325 K x bends smoothly towards its value
+    at 100 and at 400 K, so that what absorbs does not become less than nothing.
+
     Parameters
     ----------
     reference_pressure, exponent
@@ -126,7 +132,7 @@ class WarmVapour(NamedTuple):
 
     def of_path(self, atmosphere: Atmosphere, path: Float[Array, " layer"]) -> Array:
         """Amount, by vapour times the power of pressure."""
-        x = _middle(temperature_of(atmosphere)) / 250 - 1
+        x = _believed(_middle(temperature_of(atmosphere)) / 250 - 1)
         return path * (1 + x * (self.linear + x * self.quadratic))
 
 
@@ -194,6 +200,16 @@ def _power(x: Array, exponent: Array) -> Array:
     """Power of a number by an exponent, both 0 or more; where the number is 0, of slope 0."""
     power = jnp.exp(exponent * jnp.log(choose(x > 0, x, 1.0)))
     return choose(x > 0, power, (exponent == 0).astype(x.dtype))
+
+
+def _believed(x: Float[Array, " layer"]) -> Float[Array, " layer"]:
+    """Temperature over 250 K, less 1, bent beyond those that parabolas know."""
+    low, high = (limit / 250 - 1 for limit in _BELIEVED)
+    under, over = x < low, x > high
+    # Each exponential sees only what it is for.
+    colder = low + _BEND[0] * jnp.expm1((jnp.where(under, x, low) - low) / _BEND[0])
+    warmer = high - _BEND[1] * jnp.expm1((high - jnp.where(over, x, high)) / _BEND[1])
+    return jnp.where(under, colder, jnp.where(over, warmer, x))
 
 
 def _middle(level: Float[Array, " level"]) -> Float[Array, " layer"]:

@@ -8,7 +8,7 @@ import pytest
 
 from abi_operator.bands import BANDS, Band
 from abi_operator.optics.gas import ALL_GASES, gas_absorption, transmittance
-from abi_operator.optics.gas.amounts import gases_of
+from abi_operator.optics.gas.amounts import WarmVapour, gases_of
 from abi_operator.optics.gas.tables import TABLES
 from abi_operator.standard_atmospheres import standard_atmosphere
 
@@ -217,6 +217,44 @@ def test_vapour_in_c06_against_lines():
         optics = gas_absorption(atmosphere, BANDS["C06"], ("H2O",))
         got = transmittance(optics, jnp.asarray([1.0, 2.0, 4.0]))
         np.testing.assert_allclose(got, expected, atol=C06_ERROR, rtol=0)
+
+
+def test_no_temperature_makes_vapour_absorb_less_than_nothing():
+    """From next to nothing to flames; from 150 to 325 K the parabola, with its slope at the ends."""
+    warmth = np.array([1.0, 80.0, 150.0, 220.0, 300.0, 325.0, 450.0, 800.0, 5e3])
+    parabolas = [
+        absorber.amount
+        for band in ("C04", "C07")
+        for absorber in TABLES[band].absorbers
+        if isinstance(absorber.amount, WarmVapour)
+    ]
+    assert len(parabolas) == 2
+
+    def factors(temperature):
+        levels = jnp.repeat(temperature, 2)  # of which every other layer is as warm as both
+        air = eqx.tree_at(
+            lambda a: (a.pressure, a.temperature),
+            standard_atmosphere("us_standard", np.linspace(30e3, 0.0, levels.size)),
+            (jnp.linspace(0.0, 1e5, levels.size), levels),
+        )
+        path = jnp.ones(levels.size - 1)
+        return jnp.stack([amount.of_path(air, path)[::2] for amount in parabolas])
+
+    found, slopes = jax.jvp(factors, (jnp.asarray(warmth),), (jnp.ones(warmth.size),))
+    assert np.all(found > 0.05) and np.all(np.isfinite(slopes))
+    x, known = warmth / 250 - 1, slice(2, 6)
+    for amount, values, tangents in zip(parabolas, found, slopes, strict=True):
+        expected = 1 + amount.linear * x + amount.quadratic * x**2
+        np.testing.assert_allclose(values[known], expected[known], rtol=1e-14)
+        expected = (amount.linear + 2 * amount.quadratic * x) / 250
+        np.testing.assert_allclose(tangents[known], expected[known], rtol=1e-12)
+    beyond = np.array([150.0, 325.0])
+    (low, below), (high, above) = (
+        jax.jvp(factors, (jnp.asarray(beyond + np.array([-s, s])),), (jnp.ones(2),))
+        for s in (1e-7, -1e-7)
+    )
+    np.testing.assert_allclose(low, high, rtol=1e-8)
+    np.testing.assert_allclose(below, above, rtol=1e-7)
 
 
 def test_terms():
