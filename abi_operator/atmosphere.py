@@ -55,7 +55,8 @@ class Plume(eqx.Module):
 
     Extinction in a band is ``brightness * extinction_550 * relative_extinction[band]`` between
     `base` and `top` and zero elsewhere, so that the column's optical depth at 550 nm is
-    ``brightness * extinction_550 * (top - base)`` whatever the levels of the column.
+    ``brightness * extinction_550 * (top - base)`` on any levels that reach above `top`. What is
+    above the first level is not in the column.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ class Plume(eqx.Module):
 
     @property
     def aod_550(self) -> Float[Array, "*batch"]:
-        """Optical depth of the plume at 550 nm. [-]"""
+        """Optical depth of the plume at 550 nm, on levels that reach above it. [-]"""
         return self.brightness * self.extinction_550 * (self.top - self.base)
 
 
@@ -113,7 +114,7 @@ class MiePlume(eqx.Module):
 
     @property
     def aod_550(self) -> Float[Array, "*batch"]:
-        """Optical depth of the plume at 550 nm. [-]"""
+        """Optical depth of the plume at 550 nm, on levels that reach above it. [-]"""
         return self.brightness * self.extinction_550 * (self.top - self.base)
 
 

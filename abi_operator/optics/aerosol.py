@@ -19,7 +19,8 @@ def overlap(
     .. math:: h_k = c(z_k) - c(z_{k+1}), \qquad
        c(z) = \min(\max(z, z_\mathrm{base}), z_\mathrm{top})
 
-    Differences of one clipped height sum to ``top - base`` on any levels that cover the plume.
+    Differences of one clipped height sum to ``top - base`` on any levels that cover the plume; of
+    one that reaches above the first level they leave out what is there.
     Where an edge lies on a level its derivative is the one-sided one of a shrinking plume: it goes
     to the layer inside.
 

@@ -11,9 +11,10 @@ from .phase import RayleighPhase
 
 # Optical depth of air down to 1013.25 hPa after the full form of Bodhaine et al. (1999), 360 ppm
 # CO2 (`bodhaine1999`), averaged over the spectral response of GOES-16 times the solar spectrum; in
-# green at 0.555 um. [-] (response: NOAA CWG, 2016; sun: Kurucz; GOES-17 to -19 are within 0.6 %;
-# other published sets agree to 0.6 %. But for green the gravity is that of sea level, not of the
-# mean height of the air as in `bodhaine1999`: they are 0.17 % below it.)
+# green at 0.555 um. [-] (response: NOAA CWG, 2016; sun: Kurucz; GOES-17 to -19 are within 0.6 %,
+# but for 1.7 % in C04 of GOES-19 and 1.3 % in C07 of GOES-18 and -19; other published sets agree to
+# 0.6 %. But for green the gravity is that of sea level, not of the mean height of the air as in
+# `bodhaine1999`: they are 0.17 % below it.)
 STANDARD_DEPTH = {
     "C01": 0.18411,
     "green": 0.09355,

@@ -175,7 +175,10 @@ def test_refused():
 @pytest.mark.parametrize(
     ("distance", "message"),
     [
-        (np.ones((2, 1)), r"has shape \(2, 1\), but solar_zenith has \(2,\): allowed is one number"),
+        (
+            np.ones((2, 1)),
+            r"has shape \(2, 1\), but solar_zenith has \(2,\): allowed is one number",
+        ),
         (np.ones(3), r"has shape \(3,\), but"),
         (1.496e8, r"is 149600000\.0; allowed is 0\.9 to 1\.1 AU"),
         (np.array([1.0, 0.0]), r"is 0\.0; allowed"),
