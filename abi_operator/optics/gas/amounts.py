@@ -17,7 +17,7 @@ from ..pointwise import choose, pointwise
 
 _GRAVITY = 9.80665  # standard [m s-2]
 # Temperatures between which parabolas are believed [K]; beyond, they are those of temperatures that
-# bend, by this much at most in units of 250 K: no further than 100 and 400 K, where all are above 0.
+# bend, by this much at most in units of 250 K: to 100 and 400 K, where they are above 0.
 _BELIEVED, _BEND = (150.0, 325.0), (0.2, 0.3)
 
 

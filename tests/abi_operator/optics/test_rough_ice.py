@@ -123,7 +123,7 @@ def test_rough_is_for_crystals_alone_and_flagged_beyond_its_sizes(make_atmospher
 
 
 def test_rough_ice_is_fitted_where_both_of_its_fits_are(make_atmosphere):
-    """By its asymmetry factor from 5 to 60 um, by Fu's extinction and absorption from 13 to 84 um."""
+    """Its asymmetry factor from 5 to 60 um, Fu's extinction and absorption from 13 to 84."""
 
     def share(efficiencies):
         optics = CLASSES["ice"]._replace(asymmetry="baum2014", efficiencies=efficiencies)

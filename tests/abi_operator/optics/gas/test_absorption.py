@@ -220,7 +220,7 @@ def test_vapour_in_c06_against_lines():
 
 
 def test_no_temperature_makes_vapour_absorb_less_than_nothing():
-    """From next to nothing to flames; from 150 to 325 K the parabola, with its slope at the ends."""
+    """From cold to flames; from 150 to 325 K the parabola, with its slope at the ends."""
     warmth = np.array([1.0, 80.0, 150.0, 220.0, 300.0, 325.0, 450.0, 800.0, 5e3])
     parabolas = [
         absorber.amount
