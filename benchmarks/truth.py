@@ -140,7 +140,10 @@ def main():
     new, old = LIQUID_OPTICS
     states, kinds = make_states(options.columns, SEED, new)
     truth = solved(states, num_streams=options.truth_streams, num_modes=options.truth_modes)
-    for title, optics in ((f"Defaults (cloud optics {new})", new), (f"With `--cloud-optics {old}`", old)):
+    for title, optics in (
+        (f"Defaults (cloud optics {new})", new),
+        (f"With `--cloud-optics {old}`", old),
+    ):
         given, _ = make_states(options.columns, SEED, optics)
         error = relative_error(solved(given), truth, states)
         report(title, error, kinds)
