@@ -163,7 +163,7 @@ def mie_plume(
     Parameters
     ----------
     species
-        ``"smoke"``, ``"ash"`` or ``"dust"``: one that has a table (`mie_species`), whose refractive
+        Name of a species that has a table (`optics.mie_species` lists them), whose refractive
         indices `benchmarks/make_aerosol_tables.py` names with their sources.
     aod_550
         Optical depth at 550 nm where brightness is 1. [-]
