@@ -121,6 +121,8 @@ def killed(place, name, kills, seed):
         moment = rng.uniform(0, 1.1) * (compiled if number else place.seconds[name])
         ended = run(words, cache, folder, killed_after=moment)
         states["ended first" if ended.status == 0 else "killed"] += 1
+        if ended.status not in (0, -signal.SIGKILL):
+            failed.append(f"{name} ended with {ended.status} by itself: {ended.said[-500:]}")
         earlier, later = (differences(x / "out", folder / "out") for x in (before, whole))
         if earlier and later:
             failed.append(f"{name} killed after {moment:.2f} s: {earlier}")
