@@ -123,12 +123,7 @@ def open_scene(request: Request) -> Scene:
     check_background_aerosol(request.background_aerosol)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
-    check_variables(request.variables)
-    if set(request.variables) & set(OPTIONAL_RESULT) and not set(request.bands) & set(THERMAL):
-        raise InputError(
-            f"{', '.join(OPTIONAL_RESULT)} is of {', '.join(THERMAL)}; simulate it, or leave the "
-            "variable out."
-        )
+    _check_variables(request)
     series = open_wrf_series(request.wrf)
     times = series.find(request.time)
     coordinates = series.coordinates(times[0])
@@ -194,6 +189,15 @@ def open_scene(request: Request) -> Scene:
             coordinates["latitude"].values, coordinates["time"].values[times[0]]
         ),
     )
+
+
+def _check_variables(request: Request) -> None:
+    check_variables(request.variables)
+    if set(request.variables) & set(OPTIONAL_RESULT) and not set(request.bands) & set(THERMAL):
+        raise InputError(
+            f"{', '.join(OPTIONAL_RESULT)} is of {', '.join(THERMAL)}; simulate it, or leave the "
+            "variable out."
+        )
 
 
 class Report(NamedTuple):

@@ -17,20 +17,18 @@ import xarray as xr
 from ..atmosphere import State
 from ..files import InputError
 from ..files.result import CONVENTIONS
-from ..nomenclature import QUALITY_FLAGS
 from ..scene import column_states, gases_of, species_of
 from ..settings import Settings, streams_of_attributes
 from .green_change import NearInfrared, green_fields
 from .pixel_kinds import CLOUD, cloud_depth, depths_of
 from .place import with_place
 from .plume_band import PlumeBand
-from .result_checks import check_result, of_columns
+from .result_checks import DARK, check_result, of_columns
 from .ssa_root import ssa_for_mean, ssa_of_each
 
 BAND = "C03"
 """The near infrared that green is derived from."""
 _COLOURS = ("C01", "C02", BAND)
-_DARK = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 
 
 def nir_study(
@@ -94,7 +92,7 @@ def _study(
     smallest_brightness: float,
 ) -> xr.Dataset:
     brf = brf_by_band(image)
-    seen = (image["quality_flag"].values & _DARK) == 0
+    seen = (image["quality_flag"].values & DARK) == 0
     seen &= np.isfinite([brf[band] for band in _COLOURS]).all(axis=0)
     brightness = image[f"{species}_brightness"].values
     inside = (brightness > 0) & seen

@@ -5,8 +5,11 @@ from collections.abc import Sequence
 import xarray as xr
 
 from ..files import InputError
-from ..nomenclature import PLUME, SCENARIO
+from ..nomenclature import PLUME, QUALITY_FLAGS, SCENARIO
 from ..scene import classes_of, species_of
+
+DARK = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
+"""Flags of pixels whose sunlight was not simulated."""
 
 
 def check_result(image: xr.Dataset, needed: Sequence[str], bands: Sequence[str] = ()) -> None:

@@ -10,7 +10,6 @@ import xarray as xr
 
 from ..atmosphere import Fire, State
 from ..files import InputError
-from ..nomenclature import QUALITY_FLAGS
 from ..plume_edges import moves_plume_edges
 from ..scene import column_states, gases_of, species_of
 from ..scene.angles import sun_distance
@@ -19,7 +18,7 @@ from .declarations import declared
 from .derivatives import Function, Sensitivity, sensitivity
 from .inputs import Input, changed
 from .outputs import FIRE_CONTRAST, bands_of, check_outputs, output_function
-from .result_checks import check_result, of_columns
+from .result_checks import DARK, check_result, of_columns
 from .study_dataset import SampledPixels, study_dataset
 from .variance import covariance_of, sampled_variance
 
@@ -28,8 +27,6 @@ STANDARD_TEMPERATURE = 288.15
 some 1e-4 of sunlight in C06. [K]"""
 DEFAULT_FIRE = Fire(0.04, 800.0)  # pyright: ignore[reportArgumentType]
 """One cell of 400 m in a pixel of 2 km."""
-
-_DARK = QUALITY_FLAGS["night"] | QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
 
 
 class Sampling(NamedTuple):
@@ -170,7 +167,7 @@ def chosen_pixels(image: xr.Dataset, species: str | None, where: str) -> np.ndar
     """Pixels that are looked at (y, x); an `InputError` where there is none."""
     if where not in ("plume", "all"):
         raise InputError(f"pixels are those of 'plume' or 'all'; got {where!r}.")
-    chosen = (image["quality_flag"].values & _DARK) == 0
+    chosen = (image["quality_flag"].values & DARK) == 0
     if where == "plume" and species is not None:
         chosen &= image[f"{species}_brightness"].values > 0
     if not chosen.any():

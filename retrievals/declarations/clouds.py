@@ -18,10 +18,10 @@ _MICRON = 1e-6  # [m]
 def liquid_cloud() -> StateVector:
     """State vector of liquid cloud: optical thickness and effective radius of its droplets.
 
-    The cloud has to be in the state, with any mass and number above 0, as without it is not known
-    where: its layers keep their shares of the
-    optical thickness, and all get one effective radius. Optical thickness is that of droplets with
-    an extinction efficiency of 2, :math:`3 W / (2 \\rho_w r_\\mathrm{eff})`.
+    The cloud has to be in the state, with any mass and number above 0, as without them nothing
+    tells where it is: its layers keep their shares of the optical thickness, and all get one
+    effective radius. Optical thickness is that of droplets with an extinction efficiency of 2,
+    :math:`3 W / (2 \\rho_w r_\\mathrm{eff})`.
     """
     place = "atmosphere.liquid"
     thickness = Quantity(
