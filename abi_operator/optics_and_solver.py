@@ -68,7 +68,8 @@ class _Program(NamedTuple):
         cosine = max(float(np.cos(max(steepest))), float(np.finfo(np.float32).eps))
         depths = np.asarray(depths)  # columns that are not finite are NaN, however they are solved
         thickest = float(np.max(depths, where=np.isfinite(depths), initial=0))
-        return self._doubling(sufficient_doublings(thickest, cosine, settings.num_streams))
+        known = thickest, cosine, settings.num_streams, leaves[0].dtype
+        return self._doubling(sufficient_doublings(*known))
 
     def _doubling(self, number: int) -> "_Program":
         settings = self.options.settings._replace(num_doublings=number)

@@ -142,7 +142,8 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
     max_tau = np.max(map_chunks(partial(_largest_tau, forward), states, chunk=chunk))
     cosines = (np.cos(x) for x in (states.geometry.solar_zenith, states.geometry.view_zenith))
     min_mu = min(np.min(np.where(x > 0, x, 1.0)) for x in cosines)  # below the horizon: none
-    num_doublings = sufficient_doublings(float(max_tau), float(min_mu), forward.num_streams)
+    known = float(max_tau), float(min_mu), forward.num_streams, max_tau.dtype
+    num_doublings = sufficient_doublings(*known)
     edges = forward.plume_edges
     if edges is None and forward.vector.moves_plumes(states):
         edges = True

@@ -189,7 +189,7 @@ def choose_doublings(column: Column, num_streams: int) -> int:
     min_mu = min(float(np.min(x, where=x > 0, initial=1)) for x in beams)
     tau = np.asarray(column.tau)
     max_tau = float(np.max(tau, where=np.isfinite(tau), initial=0))
-    return sufficient_doublings(max_tau, min_mu, num_streams)
+    return sufficient_doublings(max_tau, min_mu, num_streams, column.tau.dtype)
 
 
 def aligned(column: Column, multiple_views: bool) -> Column:

@@ -68,7 +68,8 @@ def solve(
     # Those of None are checked by the program, which knows what can be read under derivatives too.
     checked = settings.check_values is not None
     several = settings.multiple_views
-    program = _Program(tile, gradient, faint, options, several, structure, by_view, checked)
+    how = options, several, structure, by_view, checked, column.tau.dtype
+    program = _Program(tile, gradient, faint, *how)
     return enter(program, leaves)
 
 
@@ -98,6 +99,7 @@ class _Program(NamedTuple):
     structure: Any
     by_view: Any
     checked: bool
+    dtype: Any
 
     @property
     def own_axes(self) -> tuple[int, ...]:
@@ -115,7 +117,7 @@ class _Program(NamedTuple):
     def unknown(self, what: Any) -> "_Program":
         if what == "value" or self.options.num_doublings is not None:
             return self._replace(checked=True)
-        number = unknown_doublings(self.options.num_streams)
+        number = unknown_doublings(self.options.num_streams, self.dtype)
         options = self.options._replace(num_doublings=number, unread=True)
         return self._replace(options=options, checked=True)
 

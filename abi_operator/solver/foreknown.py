@@ -39,6 +39,8 @@ def need(column: Column, options: Options) -> Float[Array, "*batch"]:
     known = expected(nothing, ground, sums, cosines)
     further = ssa * moments[:, degree] if degree > 1 else None
     alike = Alike(tau, ssa, ssa * moments[:, 1], further)
+    if degree > 2:
+        alike = alike._replace(second=ssa * moments[:, 2])
     if column.planck_levels is not None:
         up = _air(column, tau, 1 - ssa, _FEW_STREAMS).up
         warm = _warm(column, known, albedo, jnp.exp(-sums.tau / mu), up)
@@ -114,12 +116,10 @@ def _warm(
     ground's light that is `seen` by the view, and from the air's light towards it."""
     assert column.planck_levels is not None
     sun, levels = _sunlight(column), column.planck_levels
-    light = sun
-    if column.surface_emission is not None:
-        thermal = thermal + seen * column.surface_emission
-        light = light + jnp.abs(column.surface_emission - (1 - albedo) * levels[-1])
-    if column.isotropic_top is not None:
-        light = light + column.isotropic_top
+    ground = 0 if column.surface_emission is None else column.surface_emission
+    top = 0 if column.isotropic_top is None else column.isotropic_top
+    thermal = thermal + seen * ground
+    light = sun + jnp.abs(ground - (1 - albedo) * levels[-1]) + jnp.abs(top - levels[0])
     of_light = Expected(
         added=sun * known.added + levels[0],
         least=sun * known.least + thermal,

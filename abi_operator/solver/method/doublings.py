@@ -21,6 +21,10 @@ from .quadrature import double_gauss
 # Largest z = tau' / (2 mu_min) of a layer for which the start of `layer.half_layer`, doubled
 # 0, 1, 2, 3, 4 times, errs by 1e-12 or less; four times as much for each doubling after that.
 _REACH = (0.0356, 0.0713, 0.142, 0.287, 179.0)
+# Largest z of a layer's 2^K-th part in single precision. The start of a thicker one is a difference
+# of numbers z^2 / 10 times as large as itself, of which rounding leaves so much less: at cosines of
+# 1e-3 layers of 1e5 came out wrong by a third.
+_SINGLE_START = 40.0
 # Doublings and values of z among which `reaches` looks.
 _LOOKED_AT, _DEPTHS = 8, np.geomspace(1e-3, 1e5, 4001)
 
@@ -119,6 +123,7 @@ def layer_doublings(
     num_streams: int,
     most: int | None,
     error: float | None = None,
+    single: bool = False,
 ) -> Doublings:
     """Doublings of every layer of a tile: the fewest that suffice for all its columns.
 
@@ -134,6 +139,8 @@ def layer_doublings(
         Doublings of a layer, at most; None for no limit but `_MOST`.
     error
         Of a layer's response that may be left (`reaches`); None for rounding's.
+    single
+        Whether single precision is to do, too, where the layers are given in double.
 
     Columns that are not finite do not count.
     """
@@ -141,7 +148,8 @@ def layer_doublings(
     z = _half_thickness(tau, secants, num_streams)
     z = jnp.where(jnp.isfinite(z), z, 0).reshape(tau.shape[0], -1)
     thickest = jnp.max(z, axis=1, initial=0)
-    reach = np.array([_reach(k, error) for k in range(limit)])
+    single = single or tau.dtype == jnp.float32
+    reach = np.array([_reach(k, error, single) for k in range(limit)])
     reach = jnp.asarray(np.minimum(reach, np.finfo(tau.dtype).max), tau.dtype)
     count = jnp.sum(thickest[:, None] > reach, axis=1)
     table = np.array([_numbers(k) for k in range(limit + 1)])
@@ -162,7 +170,8 @@ def within_reach(
         As in `layer_doublings`.
     """
     z = _half_thickness(tau, secants, num_streams)
-    return jnp.where(z > _reach(most), jnp.nan, 1).astype(tau.dtype)
+    reach = _reach(most, single=tau.dtype == jnp.float32)
+    return jnp.where(z > reach, jnp.nan, 1).astype(tau.dtype)
 
 
 def _half_thickness(tau: Array, secants: Array, num_streams: int) -> Array:
@@ -172,17 +181,20 @@ def _half_thickness(tau: Array, secants: Array, num_streams: int) -> Array:
     return 0.5 * tau * steepest
 
 
-def _reach(doublings: int, error: float | None = None) -> float:
+def _reach(doublings: int, error: float | None = None, single: bool = False) -> float:
     known = _REACH if error is None else reaches(error)
     last = len(known) - 1
-    return known[min(doublings, last)] * 4.0 ** max(0, doublings - last)
+    reach = known[min(doublings, last)] * 4.0 ** max(0, doublings - last)
+    return min(reach, _SINGLE_START * 2.0**doublings) if single else reach
 
 
 def _numbers(doublings: int) -> tuple[int, float, float]:
     return doublings, 0.5 / 2**doublings, start_coefficient(doublings)
 
 
-def sufficient_doublings(max_tau: float, min_mu: float, num_streams: int) -> int:
+def sufficient_doublings(
+    max_tau: float, min_mu: float, num_streams: int, dtype: Any = np.float64
+) -> int:
     """Smallest offered number of doublings that is exact for layers up to `max_tau`.
 
     Parameters
@@ -193,15 +205,15 @@ def sufficient_doublings(max_tau: float, min_mu: float, num_streams: int) -> int
         Smallest cosine of the sun's and the view's zenith angle. [-]
     num_streams
         Number of streams; their smallest cosine counts as well.
+    dtype
+        Precision in which they are solved: single precision needs more for thick ones.
     """
     z = max_tau / (2 * min(min_mu, double_gauss(num_streams)[0][0]))
-    for doublings in _BUCKETS:
-        if z <= _reach(doublings):
-            return doublings
-    excess = int(np.ceil(np.log(z / _REACH[4]) / np.log(4)))
-    return 4 + excess
+    single = np.dtype(dtype) == np.float32
+    further = range(_BUCKETS[-1], _MOST)
+    return next(k for k in (*_BUCKETS, *further) if z <= _reach(k, single=single))
 
 
-def unknown_doublings(num_streams: int) -> int:
+def unknown_doublings(num_streams: int, dtype: Any = np.float64) -> int:
     """Doublings for layers that nobody knows yet: enough for tau = 1e5 at a cosine of 1e-3."""
-    return sufficient_doublings(_UNKNOWN_TAU, _UNKNOWN_MU, num_streams)
+    return sufficient_doublings(_UNKNOWN_TAU, _UNKNOWN_MU, num_streams, dtype)

@@ -5,16 +5,19 @@ as apart but for the order in which light meets them. Of light that goes down an
 that is
 
 .. math:: \frac{|\Delta|}{2}\,\frac{sT}{1+sT}\,\frac{st}{1+s(T+t)}, \qquad
-   |\Delta| = (1 + \tfrac34 d) |\Delta\omega| + |\Delta(\omega g)| + |\Delta(\omega\chi_k)|,
+   |\Delta| = (1 + \tfrac34 d) |\Delta\omega|
+   + \max(|\Delta(\omega g)|, |\Delta(\omega\chi_2)|) + |\Delta(\omega\chi_k)|
+   + \frac{|\Delta s_\odot|}{s_\odot},
 
-the first moment of what differs and one of half the streams' degree k, since layers with different
-phase functions may have one g (delta-M brings those of droplets of other sizes together), with
-rational functions in place of exponentials. In thick layers light is scattered many times, and
-absorbed as often as that: d is the larger (1 - omega g) tau of the two, as a thin black layer
-counts for little under a thick white one, and for much if it is spread through it. From the top,
-each layer joins the group above it while the sum of this over the group's members, seen through
-what lies above (1 / (1 + `ATTENUATION` times its backward depth)), stays below what the error
-budget allows; else it starts a new group.
+with rational functions in place of exponentials: the first moments of what differs and one of half
+the streams' degree k, since layers with different phase functions may have one g (delta-M brings
+those of droplets of other sizes together), and the secants of a low sun, which differ over a
+spherical Earth, and by which more or less of its light is left for the layers below. In thick
+layers light is scattered many times, and absorbed as often as that: d is the larger (1 - omega g)
+tau of the two, as a thin black layer counts for little under a thick white one, and for much if it
+is spread through it. From the top, each layer joins the group above it while the sum of this over
+the group's members, seen through what lies above (1 / (1 + `ATTENUATION` times its backward
+depth)), stays below what the error budget allows; else it starts a new group.
 
 A group emits as if its Planck function were linear in optical depth (`heat`). Its light is off by
 less than a quarter of the range D of the Planck function in it, of which that part counts that any
@@ -73,6 +76,10 @@ class Alike(NamedTuple):
         Of columns that emit, the Planck function at the upper face of each layer and at the ground,
         and what comes upon the layers from above and from below (`heat.Warm`); else None. [radiance
         unit]
+    second
+        Omega times the second moment, where `further` is of a higher degree. [-]
+    sun_secants
+        Of the sun's beam, where they may differ. [-]
     """
 
     tau: Float[Array, "layer *batch"]
@@ -81,6 +88,8 @@ class Alike(NamedTuple):
     further: Float[Array, "layer *batch"] | None = None
     planck: Float[Array, "level *batch"] | None = None
     light: Float[Array, "*batch"] | None = None
+    second: Float[Array, "layer *batch"] | None = None
+    sun_secants: Float[Array, "layer *batch"] | None = None
 
 
 class Limits(NamedTuple):
@@ -121,7 +130,8 @@ def _without_slopes(alike: Alike, limits: Limits):
     thickest = jnp.full_like(slant, limits.thickest)
     depth = slant * jnp.sum(alike.scattered * alike.tau, axis=0)
     turned = depth / (1 + depth)  # share of light on its way that is scattered
-    return jax.lax.stop_gradient((alike, slant, limits.allowed, thickest, turned))
+    cosine = None if alike.sun_secants is None else 1 / alike.sun_secants[0]
+    return jax.lax.stop_gradient((alike, slant, limits.allowed, thickest, turned, cosine))
 
 
 class _Group(NamedTuple):
@@ -132,6 +142,8 @@ class _Group(NamedTuple):
     scattered: Array
     forward: Array
     further: Array | None
+    second: Array | None
+    slant: Array | None
     lost: Array
     above: Array
     label: Array
@@ -139,17 +151,22 @@ class _Group(NamedTuple):
     span: Array | None
 
 
-def _labels(alike: Alike, slant, allowed, thickest, turned):
+def _labels(alike: Alike, slant, allowed, thickest, turned, cosine):
     def step(group: _Group, layer):
-        t, w, f, q, faces = layer
+        t, w, f, (q, p, sun), faces = layer
         depth, total = group.tau, group.tau + t
         # Differences of omega and so on, times T: one quotient in all, as they take long.
         sent_back = jnp.maximum(depth - group.forward, 0), jnp.maximum(t - f * t, 0)
         often = 1 + _DIFFUSED * jnp.maximum(*sent_back)
         absorbing = often * jnp.abs(group.scattered - w * depth)
-        difference = absorbing + jnp.abs(group.forward - f * depth)
+        turning = jnp.abs(group.forward - f * depth)
+        if group.second is not None:
+            turning = jnp.maximum(turning, jnp.abs(group.second - p * depth))
+        difference = absorbing + turning
         if group.further is not None:
             difference = difference + jnp.abs(group.further - q * depth)
+        if group.slant is not None:
+            difference = difference + cosine * jnp.abs(group.slant - sun * depth)
         hidden = (1 + slant * depth) * (1 + slant * total) * (1 + ATTENUATION * group.above)
         loss = 0.5 * difference * slant * slant * t / hidden
         if alike.light is not None:
@@ -167,7 +184,12 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
             total,
             group.scattered + w * t,
             group.forward + f * t,
-            None if group.further is None else group.further + q * t,
+            *(
+                None if x is None else x + y * t
+                for x, y in zip(
+                    (group.further, group.second, group.slant), (q, p, sun), strict=True
+                )
+            ),
             lost,
             group.above,
             group.label,
@@ -175,8 +197,8 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
             span,
         )
         above = group.above + sent_back[0]
-        own = None if q is None else q * t
-        fresh = _Group(t, w * t, f * t, own, 0 * t, above, group.label + 1, start, own_span)
+        own = (None if x is None else x * t for x in (q, p, sun))
+        fresh = _Group(t, w * t, f * t, *own, 0 * t, above, group.label + 1, start, own_span)
         group = jax.tree.map(lambda x, y: jnp.where(new, x, y), fresh, joined)
         return group, group.label
 
@@ -185,9 +207,10 @@ def _labels(alike: Alike, slant, allowed, thickest, turned):
     faces = None if planck is None else (planck[1:-1], planck[2:])
     warmth = (None, None) if planck is None else (planck[0], jnp.abs(planck[1] - planck[0]))
     # Numbers of groups are those of a tile: a column that is no number has them, too.
-    further = None if alike.further is None else alike.further[0] * t
-    start = _Group(t, w * t, f * t, further, 0 * t, 0 * t, jnp.zeros_like(t), *warmth)
-    rest = None if alike.further is None else alike.further[1:]
+    some = alike.further, alike.second, alike.sun_secants
+    own = (None if x is None else x[0] * t for x in some)
+    start = _Group(t, w * t, f * t, *own, 0 * t, 0 * t, jnp.zeros_like(t), *warmth)
+    rest = tuple(None if x is None else x[1:] for x in some)
     layers = tau[1:], alike.scattered[1:], alike.forward[1:], rest, faces
     _, labels = jax.lax.scan(step, start, layers)
     return jnp.concatenate([start.label[None], labels])

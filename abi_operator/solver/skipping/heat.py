@@ -36,9 +36,9 @@ class Warm(NamedTuple):
     known
         Of its radiance.
     light
-        What comes upon the layers from outside: the radiance of a reflectance of 1, what falls on
-        the top, and by how much the ground shines more, or less, than it would at the temperature
-        of the air on it, of which layers that are as warm give back what they take.
+        What comes upon the layers from outside: the radiance of a reflectance of 1, and by how much
+        what falls on the top and what the ground shines are more, or less, than they would be at
+        the temperature of the air there, of which layers that are as warm give back what they take.
     planck
         Planck function at the levels.
     returned

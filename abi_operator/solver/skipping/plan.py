@@ -93,6 +93,17 @@ class Plan(eqx.Module):
         assert self.known is not None and self.error_budget is not None
         return self.known.aside > budget.OF_NO_MODES * self.error_budget * self.known.least
 
+    def peaked(self) -> Bool[Array, "batch"]:
+        """Columns of which two modes in a row may be small by chance (`budget.decays`)."""
+        degrees = self.layers.moments[1]
+        num_streams = 2 * degrees.shape[1]
+        if num_streams > budget.FITTED_TO:
+            return jnp.ones(self.layers.tau.shape[1:], bool)
+        tau, coalbedo = self.layers.tau, self.layers.coalbedo
+        backwards = jnp.maximum(-degrees[:, -1] / (2 * num_streams - 1), 0)
+        backwards, scattered = (jnp.sum(x * tau, axis=0) for x in (backwards, 1 - coalbedo))
+        return backwards > budget.BACKWARD * scattered
+
     def share(
         self, light: Float[Array, "*view batch"], size: Float[Array, "batch"]
     ) -> Float[Array, "batch"]:
@@ -152,6 +163,7 @@ def planned(
         allowed = allowed * jnp.minimum(grazing, 1)
         forward = layers.moments[1][:, 0] / 3
         alike = Alike(layers.tau, 1 - layers.coalbedo, forward, _middle(layers))
+        alike = alike._replace(second=_second(layers), sun_secants=layers.sun_secants)
         if warm is not None:
             alike = alike._replace(planck=warm.planck, light=warm.light)
         groups = grouped(alike, Limits(secant, allowed, thickest))
@@ -161,7 +173,8 @@ def planned(
     secants = jnp.concatenate([layers.sun_secants[None], views])
     num_streams = 2 * layers.moments[0].shape[1]
     share = budget.OF_DOUBLINGS if warm is None else budget.OF_DOUBLINGS_WARM
-    doublings = layer_doublings(layers.tau, secants, num_streams, most, share * error_budget)
+    error, single = share * error_budget, budget.rounds(error_budget)
+    doublings = layer_doublings(layers.tau, secants, num_streams, most, error, single)
     return Plan(layers, doublings, given, groups, known, error_budget)
 
 
@@ -170,6 +183,11 @@ def _middle(layers: LayersOfModes) -> Float[Array, "layer *batch"] | None:
     None where that is g or nothing."""
     k = layers.moments[0].shape[1]
     return layers.moments[k % 2][:, k // 2] / (2 * k + 1) if k > 1 else None
+
+
+def _second(layers: LayersOfModes) -> Float[Array, "layer *batch"] | None:
+    """Omega chi_2, where that is not the `_middle`."""
+    return layers.moments[0][:, 1] / 5 if layers.moments[0].shape[1] > 2 else None
 
 
 def over_layers(
@@ -231,9 +249,9 @@ def over_modes(
         carry, found = jax.lax.scan(lambda c, mode: body(c, mode, 1.0)[:2], carry, rest)
         return carry, found
     tau = plan.layers.tau[0]
-    decays = budget.decays(2 * plan.layers.moments[0].shape[1])
-    before = (jnp.full_like(tau, jnp.inf),) * len(decays)
-    beyond = plan.beyond_the_mean()
+    latest, earlier = budget.decays()
+    before = (jnp.full_like(tau, jnp.inf),) * 2
+    beyond, peaked = plan.beyond_the_mean(), plan.peaked()
     counts = jnp.where(beyond | (start == 0), jnp.ones_like(tau), 0)
 
     def unsettled(state):
@@ -247,10 +265,8 @@ def over_modes(
         rows = jax.tree.map(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
-        wanting = share > 1
-        for decay, old in zip(decays, before, strict=True):
-            wanting = wanting | (decay * old > 1)
-        before = share, *before[:-1]
+        wanting = (share > 1) | (latest * before[0] > 1) | (peaked & (earlier * before[1] > 1))
+        before = share, before[0]
         return m + 1, carry, rows, before, jnp.where(wanting & beyond, counts, 0)
 
     rows = jax.tree.map(jnp.zeros_like, rows)

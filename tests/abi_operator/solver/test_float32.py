@@ -165,6 +165,24 @@ def test_gradients_never_compute_in_float64(error_budget):
     assert "f64" in jax.jit(jnp.sum).lower(jnp.zeros(1, jnp.float64)).as_text()
 
 
+@pytest.mark.float32
+@pytest.mark.parametrize("error_budget", [None, 1e-3])
+def test_thick_layers_under_a_grazing_view(error_budget):
+    """A third of the light was wrong where doublings were those of double precision."""
+    tau = np.float32(10) ** np.linspace(3, 5, 9, dtype=np.float32)[:, None]
+    moments = np.float32(0.8) ** np.arange(3, dtype=np.float32)
+    columns = [tau, np.float32([0.93]), moments[None], np.float32(0.26)]
+    columns += [np.float32(x) for x in (0.35, 0.001, 0.95)]
+
+    def light(*columns):
+        return np.asarray(toa_brf(*columns, num_streams=2, error_budget=error_budget))
+
+    single = light(*columns)
+    with jax.enable_x64(True):
+        double = light(*as_double(columns))
+    np.testing.assert_allclose(single, double, rtol=2e-4)
+
+
 # Long studies leave x64 on: float32 arguments alone decide the precision.
 @pytest.mark.slow
 @pytest.mark.parametrize(

@@ -238,6 +238,10 @@ def test_more_doublings_for_thicker_layers_and_lower_sun():
     for num_streams in (2, 16, 128):  # at 128 streams the smallest cosine is below 1e-3
         assert unknown_doublings(num_streams) >= sufficient_doublings(1e5, 1e-3, num_streams)
         assert sufficient_doublings(1e5, 1e-3, num_streams) <= 14
+        # In single precision the start of a thick layer has no digits left.
+        single = sufficient_doublings(1e5, 1e-3, num_streams, np.float32)
+        assert 0.5 * 1e5 / 1e-3 / 2**single <= 45
+    assert sufficient_doublings(30, 0.02, 8, np.float32) == sufficient_doublings(30, 0.02, 8)
 
 
 def test_each_layer_is_doubled_as_its_thickest_column_needs():

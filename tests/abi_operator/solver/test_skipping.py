@@ -7,10 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.solver import toa_brf
-from abi_operator.solver.method.doublings import reaches
+from abi_operator.solver import slant_path_secant, toa_brf
+from abi_operator.solver.method.doublings import Doublings, reaches
+from abi_operator.solver.skipping.budget import Expected
 from abi_operator.solver.skipping.grouping import Alike, Limits, grouped
 from abi_operator.solver.skipping.merging import Solved, handed_back, merged
+from abi_operator.solver.skipping.plan import LayersOfModes, Plan, over_modes
 
 # Rounding of sums in another order.
 ROUNDING = 1e-13
@@ -256,9 +258,52 @@ def test_layers_that_share_g_and_no_more_stay_apart():
     limits = limited(1e-4)
     alike = Alike(tau, same, 0.75 * same)
     assert groups_of(alike, limits).number == 1
-    groups = groups_of(alike._replace(further=further * same), limits)
-    assert groups.number == 2
-    np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
+    for differs in ("further", "second"):
+        groups = groups_of(alike._replace(**{differs: further * same}), limits)
+        assert groups.number == 2
+        np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) >= LAYERS // 2)
+
+
+def test_layers_are_merged_by_the_sun_that_they_see():
+    """Air of one composition under a sun that is low, over a spherical Earth."""
+    levels = np.linspace(6e4, 0, LAYERS + 1)
+    mu0 = np.cos(np.deg2rad(88))
+    given = {
+        "tau": 0.3 * np.diff(np.exp(-levels / 8e3)),
+        "ssa": np.ones(LAYERS),
+        "moments": np.tile([1, 0, 0.1], (LAYERS, 1)),
+        "albedo": 0.1,
+        "mu0": mu0,
+        "mu": 0.8,
+        "relative_azimuth": 1.0,
+        "secant": slant_path_secant(jnp.asarray(levels), jnp.asarray(mu0)),
+    }
+    whole, within = (toa_brf(**given, num_streams=2, error_budget=x) for x in (None, 1e-3))
+    np.testing.assert_allclose(within, whole, rtol=1e-3)
+
+
+def modes_that_count(last_moment, shares):
+    """Of a column of one layer with this last moment, whose modes are such shares of the budget."""
+    one = np.ones((1, 1))
+    moments = 0 * one[None], (2 * STREAMS - 1) * last_moment * one[None]
+    moments = tuple(np.repeat(x, STREAMS // 2, axis=1) for x in moments)
+    layers = LayersOfModes(one, 0 * one, one, moments)
+    known = Expected(one, one[0], one[0], 1e9 * one[0], one[0])
+    plan = Plan(layers, Doublings(None, 0), layers, None, known, 1e-3)
+
+    def body(carry, share, counts):
+        return carry, counts, share
+
+    modes = np.asarray(shares, float)[:, None]
+    return int(np.sum(over_modes(body, 0.0, modes, 0, np.zeros_like(modes), plan)[1]))
+
+
+def test_modes_end_at_a_small_one_after_one_that_is_not_large():
+    assert modes_that_count(0.1, [9, 2, 0.1, 9, 9]) == 3
+    assert modes_that_count(0.1, [9, 4, 0.1, 9, 9]) == 5
+    # Of phase functions with a peak backwards two in a row may be small by chance.
+    assert modes_that_count(-0.1, [9, 2, 0.1, 9, 9]) == 3
+    assert modes_that_count(-0.1, [99, 2, 0.1, 9, 9]) == 5
 
 
 def test_a_thin_black_layer_is_not_spread_through_a_thick_white_one():

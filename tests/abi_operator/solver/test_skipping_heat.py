@@ -99,6 +99,26 @@ def test_other_grounds_are_solved_whole():
     np.testing.assert_allclose(found, whole, rtol=ROUNDING)
 
 
+def test_cold_space_over_warm_air_is_light_too():
+    """At night, of ground and air of one temperature: what scatters sends back space's darkness."""
+    whole = np.ones((COLUMNS, LAYERS))
+    given = columns() | {
+        "tau": 2 / LAYERS * 2 * whole,
+        "ssa": np.where(np.arange(LAYERS) < LAYERS // 2, 1.0, 0.0) * whole,
+        "moments": np.broadcast_to(np.arange(STREAMS + 1) == 0, (*whole.shape, STREAMS + 1)) * 1.0,
+        "albedo": np.zeros(COLUMNS),
+        "planck_levels": np.ones((COLUMNS, LAYERS + 1)),
+        "surface_emission": np.ones(COLUMNS),
+        "solar_irradiance": np.zeros(COLUMNS),
+    }
+    exact, found = (
+        np.asarray(toa_radiance(**given, num_streams=STREAMS, error_budget=budget))
+        for budget in (None, 1e-3)
+    )
+    assert exact.max() < 0.9
+    np.testing.assert_allclose(found, exact, rtol=1e-3)
+
+
 UNSCATTERED = jax.jit(unscattered, static_argnums=5)
 
 
