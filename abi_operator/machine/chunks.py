@@ -4,7 +4,9 @@ XLA compiles a program for one number of columns and runs it on one core. Where 
 (not under `jax.jit`), they are cut into chunks of one of a program's `widths`, as they lie in
 memory. So a program is compiled for these sizes and for no other number of columns, whatever comes;
 and nothing has to be set before JAX starts. The last chunk of a size begins where it must to end
-with the last column: some columns are solved twice, but none is copied. Fewer columns than the
+with the last column: some columns are solved twice, but none is copied. They are taken of the later
+chunk, whichever is done first: a column may differ by what is solved beside it, to rounding and
+within what the solver may skip, but not from one call to an equal one. Fewer columns than the
 smallest chunk has are filled up with copies.
 
 On a CPU threads take one chunk after the other. Values are waited for. Slopes are not where there
@@ -90,12 +92,13 @@ def map_chunks(
         return _put_together(*_begun_elsewhere(columns, widths), batch)
     chunks = cut(columns.size, widths, usable_cores())
     whole = len(chunks) == 1 and batch == (chunks[0][1],)
+    own_columns = dict(zip(chunks, counts_of(chunks, columns.size), strict=True))
     results = _Results(columns.size)
 
     def finish(chunk: tuple[int, int], found: Any) -> Any:
         jax.block_until_ready(found)
-        tell_solved(min(chunk[1], columns.size - chunk[0]))
-        return found if whole else results.put(chunk[0], found)
+        tell_solved(own_columns[chunk])
+        return found if whole else results.put(chunk[0], own_columns[chunk], found)
 
     def solve(chunk: tuple[int, int]) -> Any:
         return finish(chunk, columns.begin(chunk[1], columns.of(*chunk)))
@@ -249,14 +252,14 @@ class _Results:
         self._arrays: list[np.ndarray] = []
         self._structure: Any = None
 
-    def put(self, start: int, found: Any) -> None:
+    def put(self, start: int, count: int, found: Any) -> None:
         parts, structure = jax.tree.flatten(found)
         with self._lock:
             if self._structure is None:
                 self._arrays = [_aligned((self._size, *x.shape[1:]), x.dtype) for x in parts]
                 self._structure = structure
         for array, part in zip(self._arrays, parts, strict=True):
-            array[start : start + len(part)] = np.asarray(part)[: self._size - start]
+            array[start : start + count] = np.asarray(part)[:count]
 
     def shaped(self, batch: tuple[int, ...]) -> Any:
         arrays = [x.reshape((*batch, *x.shape[1:])) for x in self._arrays]
