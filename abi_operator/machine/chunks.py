@@ -45,6 +45,11 @@ _ALIGNMENT = 64  # bytes
 _compiled: set[Any] = set()
 
 
+def forget_compiled() -> None:
+    """JAX has thrown programs away: each is compiled by one thread again, before others call it."""
+    _compiled.clear()
+
+
 def can_be_cut(arrays: Sequence[Any]) -> bool:
     """Whether columns lie on one device, and nobody settles what runs where."""
     settled = (

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 
 import jax
 
+from .chunks import forget_compiled
+
 _depth = 0
 
 
@@ -48,3 +50,4 @@ def _switch(depth: int) -> None:
     _depth = depth
     if changes:
         jax.clear_caches()  # in which functions are as they were traced before
+        forget_compiled()

@@ -6,10 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from columns import SMALL, simple_columns, small_columns
+from heard import Heard
 from states import column
 
 from abi_operator import brf
-from abi_operator.machine import plain_jax
+from abi_operator.machine import chunks, plain_jax
+from abi_operator.machine.chunks import map_chunks
+from abi_operator.machine.listening import listening
 from abi_operator.machine.plain import is_plain
 from abi_operator.solver import toa_brf
 
@@ -93,3 +96,18 @@ def test_the_switch_is_on_again_after_the_last_block_and_after_trouble(monkeypat
         assert is_plain()
     assert not is_plain()
     assert forgotten == [True, False]
+
+
+def test_a_program_that_was_thrown_away_is_compiled_by_one_thread_again(monkeypatch):
+    """Which is what a listener is told of, and others wait for."""
+    monkeypatch.setattr(jax, "clear_caches", lambda: None)  # other tests' programs
+    monkeypatch.setattr(chunks, "_compiled", set())
+    call = lambda x: jnp.asarray(x[0]), "thrown away", [np.ones(9)], [True], (9,), (4,)
+    before, after = Heard(), Heard()
+    with listening(before):
+        map_chunks(*call)
+    with plain_jax():
+        pass
+    with listening(after):
+        map_chunks(*call)
+    assert before.compiled == after.compiled == [True, False]
