@@ -5,8 +5,9 @@ first derivative: forward mode multiplies slopes by tangents, reverse mode by co
 takes them as they are, and `jax.vmap` joins the axis that it maps to the batch. So two functions of
 a `Program` serve every transformation, its value and its value with slopes, and where columns can
 be read both are compiled for a few numbers of columns and no others (`chunks`). That holds for
-derivatives and `jax.vmap` as well, the rules of which know the values that they transform; under
-`jax.jit` and in loops nobody does, and the program is compiled for the columns that there are.
+derivatives and `jax.vmap` as well, the rules of which know the values that they transform; but what
+puts slopes together and multiplies them (`slopes`), small programs, is compiled for each number of
+columns. Under `jax.jit` and in loops nobody knows values, and so is the program itself.
 
 Traced, a program is one operation with a name and shapes (`_columns`). Only what is left of it when
 all transformations are done is traced inside, once, as it is compiled: `jax.custom_jvp` and
@@ -62,7 +63,7 @@ def _plain(program: Program, leaves: Leaves) -> Any:
         return _nothing(program, "value", leaves)
     traced = any(isinstance(x, Tracer) for x in leaves)
     every = (True,) * len(leaves)
-    fixed = program.unknown(every) if traced else program.known(leaves, "value")
+    fixed = program.unknown(every) if traced else _known(program, "value", leaves)
     return _inside((fixed, "value"), [jnp.asarray(x) for x in leaves])
 
 
@@ -181,7 +182,13 @@ def _perturbs(tangent: Any) -> bool:
 def _fixed(program: Program, what: Any, leaves: Leaves) -> Program:
     """The program, with nothing left open."""
     traced = any(isinstance(x, Tracer) for x in leaves)
-    return program.unknown(what) if traced else program.known(leaves, what)
+    return program.unknown(what) if traced else _known(program, what, leaves)
+
+
+def _known(program: Program, what: Any, leaves: Leaves) -> Program:
+    """The program of columns with values, which are read even where `jax.jit` traces others."""
+    with eval_context():
+        return program.known(leaves, what)
 
 
 def _begun(program: Program, what: Any, leaves: Leaves) -> tuple[Any, Slopes] | None:
@@ -211,7 +218,7 @@ def _call(program: Program, what: Any, leaves: Leaves) -> Any:
     if call is None:
         if math.prod(_batch_of(program, leaves)) == 0:
             return _nothing(program, what, leaves)
-        return _inside((program.known(leaves, what), what), [jnp.asarray(x) for x in leaves])
+        return _inside((_known(program, what, leaves), what), [jnp.asarray(x) for x in leaves])
     found = map_chunks(**call)
     if what == "value":
         return jax.device_put(found)
@@ -225,11 +232,12 @@ def _in_memory(program: Program, what: Any, leaves: Leaves) -> dict[str, Any] | 
     batch, own = _layout(program.own_axes, tuple(np.shape(x) for x in leaves))
     if math.prod(batch) == 0 or not can_be_cut(leaves):
         return None
-    flat = [
-        _flat(as_it_lies(x), number, batch if each else ())
-        for x, number, each in zip(leaves, program.own_axes, own, strict=True)
-    ]
-    fixed = program.known(leaves, what)
+    with eval_context():  # where `jax.jit` traces others, this would become a part of their program
+        flat = [
+            _flat(as_it_lies(x), number, batch if each else ())
+            for x, number, each in zip(leaves, program.own_axes, own, strict=True)
+        ]
+        fixed = program.known(leaves, what)
     return {
         "function": partial(_alone(), (fixed, what)),
         "key": (fixed, what),

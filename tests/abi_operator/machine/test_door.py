@@ -150,3 +150,27 @@ def test_what_is_traced_has_a_name_and_shapes():
     (equation,) = jax.make_jaxpr(jax.vmap(through_the_door))(*GIVEN).eqns
     assert equation.primitive.name == "columns"
     assert [x.aval.shape for x in equation.outvars] == [(5,), (5,)]
+
+
+class Read(Waves):
+    """The same, of which another program tells something before slopes are found."""
+
+    def known(self, leaves, what):
+        if what != "value":
+            assert np.isfinite(np.asarray(enter(Waves(), leaves)["sum"])).all()
+        return self
+
+
+@pytest.mark.parametrize("device", ["cpu", "gpu"])
+def test_columns_with_values_are_read_where_others_are_traced(device, monkeypatch):
+    """The derivative at a point that is known, of a change that is not, and the value there."""
+    monkeypatch.setattr(jax, "default_backend", lambda: device)
+    rows, x, power = (jnp.asarray(y)[:, None] for y in GIVEN)
+
+    def function(rows):
+        return enter(Read(), [rows, x, power])
+
+    moved = jax.jit(lambda change: jax.jvp(function, (rows,), (change,)))(2 * rows)
+    expected = jax.jvp(lambda rows: plain(rows, x, power), (rows,), (2 * rows,))
+    for a, b in zip(*map(jax.tree.leaves, (moved, expected)), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-12)
