@@ -29,6 +29,7 @@ from jaxtyping import Array
 
 from . import compiler
 from .batching import announced, tile_by_tile
+from .checked import refuse_checked
 from .chunks import begin_chunks, can_be_cut, map_chunks
 from .cutting import as_it_lies
 from .kept import Kept
@@ -44,6 +45,7 @@ def enter(program: Program, leaves: Leaves) -> Any:
 
 def _bound(program: Program, what: Any, leaves: Leaves) -> Any:
     """What is wanted of a program: at once of values, else as one operation of what is traced."""
+    refuse_checked(leaves)
     if is_plain():
         return _plain(program, leaves)
     if not any(isinstance(x, Tracer) for x in leaves):

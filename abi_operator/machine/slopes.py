@@ -19,6 +19,8 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Float
 
+from .checked import refuse_checked
+
 Leaves = Sequence[Any]
 Shapes = tuple[tuple[int, ...], ...]
 
@@ -157,6 +159,7 @@ def contracted(
     -------
     Tangents of the results.
     """
+    refuse_checked(tangents)
     arrays, *chunks = slopes
     shapes = tuple(own_axes), results
     return _contracted.bind(*arrays, *tangents, chunks=tuple(chunks), shapes=shapes)

@@ -174,3 +174,49 @@ def test_columns_with_values_are_read_where_others_are_traced(device, monkeypatc
     expected = jax.jvp(lambda rows: plain(rows, x, power), (rows,), (2 * rows,))
     for a, b in zip(*map(jax.tree.leaves, (moved, expected)), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12)
+
+
+SHARED, MINE = jax.sharding.PartitionSpec(), jax.sharding.PartitionSpec("device")
+ROWS, X, POWER = (jnp.asarray(y) for y in GIVEN)
+
+
+def sums(rows, x):
+    return through_the_door(rows, x, POWER)["sum"]
+
+
+def all_in_all(rows, x):
+    return jax.lax.psum(jnp.sum(sums(rows, x) ** 2), "device")
+
+
+def along(change, x):
+    """At a point that does not vary from one device to the next."""
+    return jax.jvp(lambda rows: jnp.sum(sums(rows, X)), (ROWS,), (change,))[1]
+
+
+def on_devices(function, of_rows, of_x, check_vma):
+    mesh = jax.sharding.Mesh(np.asarray(jax.local_devices()[:1]), ("device",))
+    how = {"mesh": mesh, "in_specs": (of_rows, of_x), "out_specs": SHARED}
+    return jax.shard_map(function, check_vma=check_vma, **how)
+
+
+CHECKED = {
+    "value": on_devices(all_in_all, MINE, SHARED, True),
+    "compiled": jax.jit(on_devices(all_in_all, SHARED, MINE, True)),
+    "gradient": jax.grad(on_devices(all_in_all, MINE, SHARED, True), 1),
+    "passed as shared": on_devices(sums, MINE, MINE, True),
+    "change": on_devices(along, MINE, SHARED, True),
+}
+
+
+@pytest.mark.parametrize("name", CHECKED)
+def test_columns_that_differ_by_device_are_refused_where_that_is_checked(name):
+    with pytest.raises(ValueError, match=r"check_vma=True .* vary over \['device'\]"):
+        CHECKED[name](ROWS, X)
+
+
+def test_columns_on_devices_are_solved_where_nothing_is_checked_or_differs():
+    gradient = jax.grad(lambda x: jnp.sum(plain(ROWS, x, POWER)["sum"] ** 2))(X)
+    found = jax.grad(on_devices(all_in_all, MINE, MINE, False), 1)(ROWS, X)
+    np.testing.assert_allclose(found, gradient, rtol=1e-12)
+    found = on_devices(sums, SHARED, SHARED, True)(ROWS, X)
+    np.testing.assert_allclose(found, plain(ROWS, X, POWER)["sum"], rtol=1e-12)
