@@ -41,7 +41,7 @@ def undo_matrix(
     products of these with their own slopes add up to its product with its cotangent.
     """
     core, own, rest = _undo_diagonal(bar.core, coalbedo, mean)
-    pairs, nodes = _on_pairs(kernels.nodes, core), _on_nodes(kernels.nodes, bar.border)
+    pairs, nodes = _on_pairs(kernels.nodes, core), on_nodes(kernels.nodes, bar.border)
     corner = bar.corner if single_scattering else None
     slopes = _undo_products(
         pairs, nodes, kernels.beams, moments, secants, bar.diagonal, corner, rest
@@ -65,7 +65,7 @@ def undo_inverse(
     border = _border_of_side(p.core, p.border, p_bar.border, p_bar.corner)
     solved = kernel_of_product(_by_degrees, moments.shape[0])(kernels.nodes, p.core)
     driven = matmul(p_bar.core, solved)
-    sent, nodes = _on_nodes(kernels.nodes, p.border), _on_nodes(kernels.nodes, border)
+    sent, nodes = on_nodes(kernels.nodes, p.border), on_nodes(kernels.nodes, border)
     pairs = _between_degrees(solved, driven, sent, nodes, p_bar.corner)
     corner = p_bar.corner if single_scattering else None
     cores = _columns_of_products(p.core, p_bar.core)
@@ -138,7 +138,8 @@ def _on_same_degree(nodes, half):
 
 
 @fenced
-def _on_nodes(nodes, border):
+def on_nodes(nodes, border):
+    """Of each degree, the sum over the nodes of its functions times a border or fields."""
     expand = (None, slice(None)) + (None,) * (border.ndim - 2)
     return total([nodes[i][expand] * border[i][:, None] for i in range(nodes.shape[0])])
 
