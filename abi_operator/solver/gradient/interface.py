@@ -89,14 +89,14 @@ def _of_diffuse(seen, beams, own):
 def _without_diagonal(slopes, nodes, fields):
     """The mean's slopes: its diagonal is formed from the other entries of its row."""
     mu, weight = double_gauss(2 * nodes.shape[0])
-    s = np.sqrt(weight * mu)
+    s = np.sqrt(weight * mu).tolist()
 
     @fenced
     def without(slopes, nodes, fields):
         expand = (slice(None),) + (None,) * (fields.ndim - 2)
         own = fields[:, 0] * fields[:, 1]
-        row = total([(nodes[i] / s[i])[expand] * own[i] for i in range(s.size)])
-        return slopes - row * total([s[j] * nodes[j] for j in range(s.size)])[expand]
+        row = total([(nodes[i] / s[i])[expand] * own[i] for i in range(len(s))])
+        return slopes - row * total([s[j] * nodes[j] for j in range(len(s))])[expand]
 
     return without(slopes, nodes, fields)
 
