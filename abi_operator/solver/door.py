@@ -100,6 +100,7 @@ class _Program(NamedTuple):
     by_view: Any
     checked: bool
     dtype: Any
+    of_slopes: bool = False
 
     @property
     def own_axes(self) -> tuple[int, ...]:
@@ -109,17 +110,21 @@ class _Program(NamedTuple):
         column = jax.tree.unflatten(self.structure, leaves)
         if not self.checked:
             check_in_memory(column._asdict())
+        program = self._of(what)
         if what == "value" or self.options.num_doublings is not None:
-            return self._replace(checked=True)
+            return program
         number = choose_doublings(column, self.options.num_streams)
-        return self._replace(options=self.options._replace(num_doublings=number), checked=True)
+        return program._replace(options=self.options._replace(num_doublings=number))
 
     def unknown(self, what: Any) -> "_Program":
+        program = self._of(what)
         if what == "value" or self.options.num_doublings is not None:
-            return self._replace(checked=True)
+            return program
         number = unknown_doublings(self.options.num_streams, self.dtype)
-        options = self.options._replace(num_doublings=number, unread=True)
-        return self._replace(options=options, checked=True)
+        return program._replace(options=self.options._replace(num_doublings=number, unread=True))
+
+    def _of(self, what: Any) -> "_Program":
+        return self._replace(checked=True, of_slopes=what != "value")
 
     def own_result(self, leaves: Leaves) -> Any:
         column = jax.tree.unflatten(self.structure, leaves)
@@ -148,7 +153,7 @@ class _Program(NamedTuple):
         return self._needed if self._in_order else None
 
     def _needed(self, leaves: Leaves) -> Array:
-        return need(self._aligned(leaves), self.options)
+        return need(self._aligned(leaves), self.options, self.of_slopes)
 
     @property
     def at_once(self) -> AtOnce | None:

@@ -20,8 +20,9 @@ _FEW_STREAMS = 2  # where nobody looks downwards
 _SOME_ALBEDO = 0.1  # of a ground that is none, where a rough one will do
 
 
-def need(column: Column, options: Options) -> Float[Array, "*batch"]:
-    """How much of columns will be solved, for those that need alike to be solved together."""
+def need(column: Column, options: Options, slopes: bool) -> Float[Array, "*batch"]:
+    """How much of columns will be solved for values, or for slopes as well, for those that need
+    alike to be solved together."""
     assert options.error_budget is not None
     moments, degree = column.moments, options.num_streams // 2
     tau, ssa = column.tau, column.ssa
@@ -45,7 +46,7 @@ def need(column: Column, options: Options) -> Float[Array, "*batch"]:
         up = _air(column, tau, 1 - ssa, _FEW_STREAMS).up
         warm = _warm(column, known, albedo, jnp.exp(-sums.tau / mu), up)
         known, alike = warm.known, alike._replace(planck=column.planck_levels, light=warm.light)
-    return company.need(alike, known, column.mu0, mu, options.error_budget)
+    return company.need(alike, known, column.mu0, mu, options.error_budget, slopes)
 
 
 def _depths_of(layers: ScaledLayers, directions: Directions) -> Depths:

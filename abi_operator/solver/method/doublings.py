@@ -211,7 +211,8 @@ def sufficient_doublings(
     z = max_tau / (2 * min(min_mu, double_gauss(num_streams)[0][0]))
     single = np.dtype(dtype) == np.float32
     further = range(_BUCKETS[-1], _MOST)
-    return next(k for k in (*_BUCKETS, *further) if z <= _reach(k, single=single))
+    enough = (k for k in (*_BUCKETS, *further) if z <= _reach(k, single=single))
+    return next(enough, _MOST)
 
 
 def unknown_doublings(num_streams: int, dtype: Any = np.float64) -> int:

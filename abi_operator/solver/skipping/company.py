@@ -12,7 +12,8 @@ as if light scattered twice, of which there is S^2 s, lost the same share of its
 mode until it counts less than the budget b times the reflectance R; s is the sum of the secants.
 Every other number of groups begins with the columns of most modes, so that a tile of two numbers
 has columns that are alike in their modes. The order only costs time where it is wrong, and with few
-streams (`SORTED_FROM`) it costs more than it saves.
+streams (`SORTED_FROM`) it costs more than it saves. Of slopes more groups are made, and other
+columns need most of them: their order is one of its own.
 """
 
 import jax
@@ -34,6 +35,7 @@ def need(
     mu0: Float[Array, "*batch"],
     mu: Float[Array, "*batch"],
     error_budget: float,
+    slopes: bool,
 ) -> Float[Array, "*batch"]:
     """A number that is near for columns of which nearly as much is solved. [-]
 
@@ -45,11 +47,16 @@ def need(
         Cosines of the sun's and the view's zenith angle. [-]
     error_budget
         As in `plan.planned`.
+    slopes
+        Whether these are wanted.
     """
     alike, known, mu0, mu = jax.lax.stop_gradient((alike, known, mu0, mu))
     secants = 1 / mu0 + 1 / mu
-    allowed = budget.OF_MERGING * error_budget * known.least * jnp.minimum(mu0 + mu, 1)
-    labels = group_labels(alike, Limits(0.5 * secants, allowed, float("inf")))
+    of_groups, thickest = error_budget, float("inf")
+    if slopes:
+        of_groups, thickest = min(error_budget, budget.OF_SLOPES), budget.THICKEST
+    allowed = budget.OF_MERGING * of_groups * known.least * jnp.minimum(mu0 + mu, 1)
+    labels = group_labels(alike, Limits(0.5 * secants, allowed, thickest))
     depth = jnp.sum(alike.scattered * alike.tau, axis=0)
     twice = (depth / (1 + depth)) ** 2 * secants / (error_budget * known.least)
     if alike.light is not None:
