@@ -21,6 +21,7 @@ from ..method.mode_layers import read
 from ..method.rounding import as_deep_as_seen, in_single_precision
 from ..skipping import budget
 from ..skipping.budget import Expected
+from ..skipping.grouping import Groups
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
 from .mode import Shared, mode_slopes
 from .modes import LATER, WHOLE, How, Mode, along, every_mode
@@ -225,7 +226,8 @@ def _reflectance_and_gradient(inputs, plan, how):
         carry = value, found.shared, of_mean, room
         if plan.error_budget is None:
             return carry, row, None
-        of_slopes = plan.share_of_slopes(found.square, found.shared.layers.tau)
+        of_tau = of_own_groups(plan.groups, found.shared.layers.tau)
+        of_slopes = plan.share_of_slopes(found.square, of_tau)
         share = jnp.maximum(of_slopes, plan.share(0.5 * value[None], jnp.abs(reflection)))
         # The mean is never the last by chance.
         return carry, row, jnp.where(mode.order.mean > 0, jnp.full_like(share, jnp.inf), share)
@@ -251,6 +253,17 @@ def _reflectance_and_gradient(inputs, plan, how):
         weights=reflections,
     )
     return value, gradient
+
+
+def of_own_groups(
+    groups: Groups | None, tau_slopes: Float[Array, "layer *batch"]
+) -> Float[Array, "layer *batch"]:
+    """Slopes in depths, but those of groups that a column does not have: a tile has as many as its
+    column with most, and a group has such a slope although it is empty."""
+    if groups is None:
+        return tau_slopes
+    numbers = jnp.arange(len(tau_slopes), dtype=tau_slopes.dtype)[:, None]
+    return jnp.where(numbers <= groups.labels[-1], tau_slopes, 0)
 
 
 @reflectance_and_gradient.defjvp

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from abi_operator.solver import toa_brf
+from abi_operator.solver.gradient.mode_sum import of_own_groups
 from abi_operator.solver.skipping import company
 from abi_operator.solver.skipping.budget import Expected
-from abi_operator.solver.skipping.grouping import Alike
+from abi_operator.solver.skipping.grouping import Alike, Groups
 
 LAYERS = 12
 
@@ -49,3 +50,11 @@ def test_columns_are_in_order_of_what_is_wanted(monkeypatch, of_slopes):
 
     with pytest.raises(Told):
         jax.jit(jax.grad(total) if of_slopes else total).lower(given)
+
+
+def test_groups_that_a_column_does_not_have_are_none_of_its_slopes():
+    """The last modes are small beside the slopes in depth, of which empty groups have some."""
+    labels = jnp.array([[0.0, 0, 0], [0, 1, 0], [0, 2, 1]])
+    groups = Groups(labels, labels.min(axis=1), labels.max(axis=1), jnp.array(3.0))
+    found = of_own_groups(groups, jnp.ones((3, 3)))
+    np.testing.assert_array_equal(found, [[1, 1, 1], [0, 1, 1], [0, 1, 0]])
