@@ -41,8 +41,9 @@ class Glimpse(NamedTuple):
     least: Float[Array, "*batch"]
 
     def enough(self, error_budget: float) -> Bool[Array, "*batch"]:
-        """Whether no more is missing than the budget allows."""
-        return self.missing <= budget.OF_FAINT * error_budget * self.least
+        """Whether no more is missing than the budget allows, and the light is a number."""
+        known = jnp.all(jnp.isfinite(self.light), axis=0)
+        return known & (self.missing <= budget.OF_FAINT * error_budget * self.least)
 
 
 def can_be_seen(column: Column, options: Options) -> bool:

@@ -43,6 +43,7 @@ from .one_pass import Scattered
 
 _SCATTERED = 2.4  # mean secant of light that thin air sends on to all sides alike
 _UNSURE = 0.6  # share of what absorbs along it that is not known better
+_OPAQUE = 1e6  # depth below what scatters, or half its square, of which nothing is seen
 _TWICE = 2.0  # what is scattered twice and more, over what thin layers send to one another
 
 
@@ -74,7 +75,8 @@ def of_sunlight(
     to_view = jnp.exp(-absorbed / mu - back[1])
     seen = albedo * to_ground * to_view
     longer = [s - _SCATTERED for s in secants]
-    once, squared = (x / some for x in scattered.over_absorbers)
+    # A bound, of which the square is finite: through as much as that no light is seen.
+    once, squared = (jnp.minimum(x / some, _OPAQUE) for x in scattered.over_absorbers)
     more = total([x * y * (once + y * squared) for x, y in zip(on, longer, strict=True)])
     light = seen * (1 + more + again * jnp.exp(-_SCATTERED * absorbed))
     # Light that is scattered out of a beam may meet next to nothing where that is absorbed.

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from abi_operator.solver import toa_brf, toa_radiance
+from abi_operator.solver.glimpse import Glimpse
 from abi_operator.solver.gradient import emission, mode_sum
 from abi_operator.solver.skipping import budget
 
@@ -71,6 +72,23 @@ def test_nothing_is_solved(monkeypatch):
     own = BUDGET * (1 + 1e-9)
     assert np.isfinite(brf(columns(scattered=1e-4), own)).all()
     assert np.isnan(brf(columns(scattered=0.1), own)).any()
+
+
+def test_thin_air_over_what_is_opaque():
+    """The square of a depth that is no number in single precision is of no light: what is left is
+    scattered once, and hardly any twice."""
+    tau = np.asarray([[1e-4, 1e20], [1e-4, 1e10], [1e-4, 1e3]])
+    given = {"tau": tau, "ssa": np.asarray([1.0, 0.0]), "moments": np.eye(1, 3) * np.ones((2, 1))}
+    given = given | {"albedo": 0.3, "mu0": 0.5, "mu": 0.5, "relative_azimuth": 1.0}
+    found = toa_brf(**given, num_streams=2, error_budget=BUDGET)
+    np.testing.assert_allclose(found, -np.expm1(-4e-4) / 4, rtol=BUDGET)
+
+
+def test_light_that_is_no_number_is_not_enough():
+    nothing = jnp.zeros(2)
+    light = jnp.asarray([[1.0, 1.0], [jnp.nan, 1.0]])
+    glimpse = Glimpse(light, nothing, nothing + 1)
+    np.testing.assert_array_equal(glimpse.enough(BUDGET), [False, True])
 
 
 def test_the_budget_is_kept():
