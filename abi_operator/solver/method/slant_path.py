@@ -36,7 +36,7 @@ def slant_path_secant(
     height: Float[Array, "*#batch level"],
     mu0: Float[Array, "*#batch"],
     *,
-    tau: Float[Array, "*#batch layer"] | None = None,
+    tau: Float[Array, "*#batch #layer"] | None = None,
     radius: float = 6371e3,
 ) -> Float[Array, "*batch layer"]:
     r"""Length of the sunbeam in each layer over the layer's thickness.
@@ -60,7 +60,7 @@ def slant_path_secant(
     mu0
         Cosine of the solar zenith angle, 0 to 1. [-]
     tau
-        Optical depths, top first; with them all layers get the mean secant
+        Optical depths, top first, or one for every layer; with them all layers get the mean secant
         :math:`\sum_i s_i \tau_i / \sum_i \tau_i`, the better choice for light scattered in air
         (see above). None for each layer's own. [-]
     radius
@@ -82,8 +82,9 @@ def slant_path_secant(
     own = (2 + above[..., :-1] + above[..., 1:]) / (root[..., :-1] + root[..., 1:])
     if tau is None:
         return own
-    total = jnp.sum(tau, axis=-1, keepdims=True)
-    # Without any optical depth nothing is attenuated, and every weight is as good.
-    weight = jnp.where(total > 0, safe_divide(tau, total), 1 / tau.shape[-1])
-    mean = jnp.sum(weight * own, axis=-1, keepdims=True)
-    return jnp.broadcast_to(mean, jnp.broadcast_shapes(own.shape, tau.shape))
+    tau, own = jnp.broadcast_arrays(tau, own)
+    share = safe_divide(tau, jnp.sum(tau, axis=-1, keepdims=True))
+    # Without an optical depth to divide by nothing is attenuated, and every weight is as good.
+    some = jnp.sum(share, axis=-1, keepdims=True) > 0
+    weight = jnp.where(some, share, 1 / tau.shape[-1])
+    return jnp.broadcast_to(jnp.sum(weight * own, axis=-1, keepdims=True), own.shape)

@@ -183,3 +183,19 @@ def test_the_mean_secant_is_one_for_all_layers():
     empty, slope = jax.value_and_grad(total)(0 * tau)
     np.testing.assert_allclose(empty, np.sum(own), rtol=1e-14)
     assert np.all(np.isfinite(slope))
+
+
+@pytest.mark.float32
+def test_the_mean_secant_of_next_to_no_optical_depth():
+    """Too little to divide by: every layer counts alike, as where there is none."""
+    height, tau = jnp.asarray(HEIGHT, jnp.float32), jnp.full(6, 1e-20, jnp.float32)
+    found = secants(height, jnp.float32(0.2), tau=tau)
+    own = np.asarray(secants(height, jnp.float32(0.2)))
+    np.testing.assert_allclose(found, np.full(6, own.mean()), rtol=1e-6)
+    total = jax.jit(jax.grad(lambda t: jnp.sum(slant_path_secant(height, jnp.float32(0.2), tau=t))))
+    assert np.all(np.isfinite(total(tau)))
+
+
+def test_the_mean_secant_of_one_optical_depth_for_all_layers():
+    one = secants(HEIGHT, 0.2, tau=np.asarray([0.3]))
+    np.testing.assert_allclose(one, secants(HEIGHT, 0.2, tau=np.full(6, 0.3)), rtol=1e-14)
