@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 
@@ -29,7 +30,8 @@ def delta_m(
 
     With f = chi_N and N = `num_streams`: :math:`\tau' = (1-\omega f)\tau`,
     :math:`\omega' = (1-f)\omega/(1-\omega f)`, :math:`\chi'_l = (\chi_l - f)/(1-f)` for l < N.
-    Absorption, tau (1 - omega), is unchanged.
+    Absorption, tau (1 - omega), is unchanged. At f = 1, where all scattered light goes straight on,
+    the layer is what it is a rounding below: one that scatters next to nothing.
 
     Parameters
     ----------
@@ -44,6 +46,8 @@ def delta_m(
        doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2
     """
     f = moments[:, num_streams]
+    # The quotients below have limits at f = 1. A difference keeps the slope in f.
+    f = f - jnp.where(f < 1, 0, jnp.finfo(f.dtype).epsneg.astype(f.dtype))
     rest = 1 - ssa * f
     # A quotient takes as long as ten products.
     ratio, per_rest = 1 / (1 - f[:, None]), 1 / rest

@@ -23,9 +23,12 @@ from ...machine.algebra import total
 from ...machine.kernels import one_kernel
 from ..method.mode_layers import read
 from ..method.quadrature import double_gauss
-from ..method.single_scatter import extinguished
 from .budget import Expected
 from .grouping import Groups
+
+# Below which both of `emissivities` are right to rounding by so many terms of a series, in double
+# precision and in single.
+_THIN, _TERMS, _TERMS_OF_FLOAT32 = 0.25, 12, 7
 
 
 class Warm(NamedTuple):
@@ -117,11 +120,15 @@ def _unscattered(layers, secant, nodes, number=None):
 
 def emissivities(x: Array) -> tuple[Array, Array, Array]:
     """Transmission, 1 less that, and how much of the increase leaves through the upper face."""
-    through = jnp.exp(-x)
-    mean = extinguished(x, through)
-    some = x > 0
-    ratio = jnp.where(some, mean / jnp.where(some, x, 1), 1)
-    return through, mean, ratio - through
+    through, thin = jnp.exp(-x), x < _THIN
+    # By their series where a difference would lose digits, with what is no power of a large number.
+    small = jnp.where(thin, x, 0)
+    series = jnp.ones_like(x)
+    for k in range(_TERMS if x.dtype == jnp.float64 else _TERMS_OF_FLOAT32, 2, -1):
+        series = 1 - small * (1 / k) * series
+    mean = jnp.where(thin, small * (1 - 0.5 * small * series), 1 - through)
+    ratio = (1 - through) / jnp.where(thin, 1, x)
+    return through, mean, jnp.where(thin, small * (1 - 0.5 * (1 + small) * series), ratio - through)
 
 
 def lost(

@@ -1,5 +1,7 @@
 """The solver's parts on their own: quadrature, Legendre functions, bordered matrices, layers."""
 
+from decimal import Decimal, localcontext
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -23,6 +25,7 @@ from abi_operator.solver.method.layer import half_layer
 from abi_operator.solver.method.legendre import associated_legendre, legendre_series
 from abi_operator.solver.method.quotient import minus_and_quotient, minus_quotient
 from abi_operator.solver.method.single_scatter import exact_single_scattering
+from abi_operator.solver.skipping.heat import emissivities
 
 REACH_ERROR = 2e-12  # what `doublings` promises, and rounding
 
@@ -69,6 +72,35 @@ def test_delta_m_leaves_absorption_and_mean_forward_scattering_alone():
         scaled.tau * (1 - scaled.ssa * scaled.moments[:, 1]), tau * (1 - ssa * g), rtol=1e-13
     )
     np.testing.assert_allclose(scaled.ssa, 1 - scaled.coalbedo, rtol=1e-13)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_delta_m_where_all_light_goes_straight_on(dtype):
+    """Such a layer absorbs and scatters nothing, whatever its albedo; its slopes are finite."""
+    ssa = np.asarray([0, 0.5, 1], dtype)
+    given = np.full_like(ssa, 2), ssa, np.ones((3, 3), dtype)
+
+    def scaled(*arrays):
+        layers = delta_m(*arrays, 2)
+        scatters = (layers.tau * layers.ssa)[:, None] * layers.moments
+        return layers.tau, scatters, layers.tau * layers.coalbedo, layers.scattering_ratio
+
+    tau, scatters, absorbs, ratio = jax.jit(scaled)(*given)
+    rounding = 4 * np.finfo(dtype).eps
+    np.testing.assert_allclose(tau, [2, 1, 0], atol=rounding)
+    np.testing.assert_allclose(scatters, 0, atol=rounding)
+    np.testing.assert_allclose(absorbs, [2, 1, 0], atol=rounding)
+    np.testing.assert_allclose(ratio[:2], [0, 1], rtol=rounding)
+    # Light scattered once is that of the layer as it is given, where nothing absorbs too.
+    np.testing.assert_allclose(tau * ratio, ssa * given[0], rtol=rounding)
+    forward, reverse = (
+        jax.jit(jacobian(scaled, argnums=(0, 1, 2)))(*given)
+        for jacobian in (jax.jacfwd, jax.jacrev)
+    )
+    for one, other in zip(jax.tree.leaves(forward), jax.tree.leaves(reverse), strict=True):
+        assert one.dtype == dtype and np.all(np.isfinite(one))
+        np.testing.assert_allclose(one, other, rtol=rounding, atol=rounding)
+    np.testing.assert_allclose(np.diagonal(forward[0][2][..., 2]), -2 * ssa, rtol=rounding)
 
 
 def test_bordered_matrices_act_on_light_without_a_sun():
@@ -281,6 +313,30 @@ def test_half_layer_is_tanh_up_to_the_reach_of_its_doublings(doublings):
     for found, exact in ((admittance, np.tanh(h)), (impedance, h / np.tanh(h))):
         for entry in (np.asarray(found.core)[0, 0], np.asarray(found.diagonal)[0]):
             np.testing.assert_allclose(entry, exact, rtol=REACH_ERROR)
+
+
+@pytest.mark.parametrize(("dtype", "digits"), [(np.float64, 1e-14), (np.float32, 3e-6)])
+def test_thermal_light_of_thin_layers_keeps_its_digits(dtype, digits):
+    """From next to nothing to opaque, also about where a series takes over."""
+    x = np.concatenate([[0], 10.0 ** np.arange(-12, 3), np.linspace(0.04, 0.06, 9), [1e30]])
+    x = x.astype(dtype)
+    with localcontext(prec=120):
+        exact = [Decimal(float(value)) for value in x]
+        some = [value if value else Decimal("1e-30") for value in exact]
+        wanted = [(1 - (-v).exp()) / v - (-v).exp() for v in some]
+        # x slope = exp(-x) (1 + x) - (1 - exp(-x)) / x + x exp(-x), by hand, over x
+        slopes = [((-v).exp() * (v * v + v + 1) - 1) / (v * v) for v in some]
+    found = jax.jit(lambda x: emissivities(x)[2])(x)
+    assert found.dtype == dtype
+    np.testing.assert_allclose(found, np.array(wanted, float), rtol=digits, atol=1e-29)
+    one, tangent = jnp.asarray(x), jnp.ones_like(x)
+    of_all = jax.jit(lambda x: jax.jvp(emissivities, (x,), (tangent,))[1])(one)
+    by_reverse = jax.jit(jax.grad(lambda x: jnp.sum(emissivities(x)[2])))(one)
+    assert all(np.all(np.isfinite(slope)) for slope in of_all)
+    thin = x <= 1
+    for slope in (of_all[2], by_reverse):
+        assert np.all(np.isfinite(slope))
+        np.testing.assert_allclose(slope[thin], np.array(slopes, float)[thin], rtol=500 * digits)
 
 
 @pytest.mark.parametrize(("dtype", "digits"), [(np.float64, 1e-13), (np.float32, 2e-6)])
