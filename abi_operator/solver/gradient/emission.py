@@ -136,6 +136,7 @@ def _radiance(lit: Lit, plan: Plan, how: How) -> Float[Array, "*batch"]:
     closed, nothing = top(stack), jnp.zeros_like(lit.heating.above)
     emitted = closed.emerging(light, one, 0.5 * lit.heating.above, nothing)[1]
     mean = first.weight * closed.reflection()[0] + emitted
+    largest = 2 * jnp.abs(first.weight)  # weight of any other mode, but for its cosine
 
     lowered = in_single_precision if how.rounds(plan, _num_nodes(lit)) else lambda x: x
     later, plan_of_later = lowered(lit), lowered(plan)
@@ -145,10 +146,11 @@ def _radiance(lit: Lit, plan: Plan, how: How) -> Float[Array, "*batch"]:
         ground = own.below(later.ground, mean=False)
         stack, _ = _stacked(later, own, ground, None, plan_of_later, how)
         reflection = top(stack).reflection()[0].astype(total.dtype)
-        found = counts * mode.weight * reflection
-        total = total + found
-        share = None if plan.error_budget is None else plan.share(total[None], jnp.abs(found))
-        return total, None, share
+        total = total + counts * mode.weight * reflection
+        if plan.error_budget is None:
+            return total, None, None
+        # Whatever the azimuth: where the cosine of this mode is small that of the next is not.
+        return total, None, plan.share(total[None], counts * largest * jnp.abs(reflection))
 
     return over_modes(plus, mean, every, 1, None, plan)[0]
 

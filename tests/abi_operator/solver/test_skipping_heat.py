@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from surfaces import Constant
 
-from abi_operator.solver import toa_radiance
+from abi_operator.solver import toa_brf, toa_radiance
 from abi_operator.solver.skipping.grouping import Alike, Limits, grouped
 from abi_operator.solver.skipping.heat import unscattered
 from abi_operator.solver.skipping.one_pass import Air, known
@@ -79,6 +79,29 @@ def test_light_of_fires_below_and_on_the_top_is_counted():
         )
         wrong = np.abs(found - whole) / whole
         assert 0 < np.quantile(wrong, 0.99) < 1e-3 and wrong.max() < 1e-2
+
+
+def test_modes_do_not_end_where_a_cosine_is_small():
+    """Where the second is nothing by its azimuth it says nothing of the third: without heat as many
+    are solved as of a reflectance."""
+    rng, count = np.random.default_rng(0), 400
+    g, tau = rng.uniform(0.3, 0.85, (count, 1)), 10 ** rng.uniform(-1.5, 0.5, (count, 1))
+    mu0, mu = rng.uniform(0.1, 1, (2, count))
+    given = {
+        "tau": tau,
+        "ssa": rng.uniform(0.7, 1, (count, 1)),
+        "moments": g[..., None] ** np.arange(STREAMS + 1),
+        "phase_function": np.ones((count, 1)),
+        "albedo": np.full(count, 0.1),
+        "mu0": mu0,
+        "mu": mu,
+        "relative_azimuth": np.full(count, np.pi / 4),
+    }
+    how = {"num_streams": STREAMS, "error_budget": 1e-3}
+    brf = toa_brf(**given, **how)
+    cold = {"solar_irradiance": np.pi / mu0, "planck_levels": np.zeros((count, 2))}
+    found = toa_radiance(**given, **cold, **how)
+    np.testing.assert_allclose(found, brf, rtol=1e-6)
 
 
 def test_slopes_are_those_of_every_layer():
