@@ -13,6 +13,7 @@ from .bands import check_bands
 from .machine.algebra import converted
 from .ranges import FINITE, STATE
 from .satellites import check_satellite, gas_fit_covers
+from .solver.column import common_type
 
 # Pressure at the ground where there is air: far from what the same air has in hPa. [Pa]
 _GROUND_PRESSURE = 2e3, 1.2e5
@@ -126,8 +127,12 @@ def uniform(state: State) -> tuple[State, tuple[int, ...]]:
     The state, and the shape of the batch.
     """
     leaves = jax.tree.leaves(state)
-    arrays = [x for x in leaves if hasattr(x, "dtype")]
-    dtype = jax.dtypes.canonicalize_dtype(np.result_type(*(x.dtype for x in arrays), np.float16))
+
+    def labels() -> list[str]:
+        paths = jax.tree_util.tree_leaves_with_path(state)
+        return [f"state{jax.tree_util.keystr(path)}" for path, _ in paths]
+
+    dtype = common_type(leaves, labels)
     batch = np.shape(state.geometry.solar_zenith)
     num_levels = _num_levels(state, len(batch))
 

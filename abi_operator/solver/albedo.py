@@ -40,7 +40,7 @@ def toa_albedo(
 
     One mode and no view are solved. Arguments, derivatives and errors are those of `toa_brf`.
     """
-    no_view = np.zeros(0, np.float16)
+    no_view = np.zeros(0, bool)  # of no floating type
     column = promoted(
         tau=tau,
         ssa=ssa,
@@ -69,6 +69,9 @@ class SurfaceCoupling(eqx.Module):
         c, transmission from the sun to the ground times that from the ground to the view. [-]
     spherical_albedo
         S, the albedo of the atmosphere seen from below. [-]
+    multiple_views
+        Whether the last axis of `brf_black` and `coupling` is over views of the same columns, which
+        `spherical_albedo` does not have.
     """
 
     brf_black: Float[Array, "*batch"]

@@ -1,5 +1,6 @@
 """A column as the solver takes it: the arguments of its doors, promoted, checked and aligned."""
 
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -77,13 +78,46 @@ def promoted(**arguments: Any) -> Column:
         arguments["albedo"] = arguments["albedo"].albedo
     arguments = {k: _array(x) if isinstance(x, list | tuple) else x for k, x in arguments.items()}
     leaves, structure = jax.tree.flatten(Column(**arguments))
+    dtype = common_type(leaves, lambda: names(structure))
+    return jax.tree.unflatten(structure, [converted(x, dtype) for x in leaves])
+
+
+def common_type(leaves: Sequence[Any], labels: Callable[[], Sequence[str]]) -> np.dtype:
+    """Floating type that numbers and arrays have in common.
+
+    What has no type of its own follows the others: truth values, and Python's numbers, also where a
+    transformation of JAX has made arrays of them.
+
+    Parameters
+    ----------
+    leaves
+        Numbers and arrays.
+    labels
+        What each of them is called, if one is refused.
+
+    Raises
+    ------
+    TypeError
+        For what is no real number of up to 64 bits, bfloat16 among it: of it and float16 there is
+        nothing in common.
+    """
     arrays = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
-    types = [
-        leaf if isinstance(leaf, int | float) else array.dtype
-        for leaf, array in zip(leaves, arrays, strict=True)
-    ]
-    dtype = jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
-    return jax.tree.unflatten(structure, [converted(x, dtype) for x in arrays])
+    for place, array in enumerate(arrays):
+        kind = getattr(array.dtype, "kind", "")
+        if kind not in ("b", "i", "u", "f") or array.dtype.itemsize > 8:
+            raise TypeError(
+                f"{labels()[place]} is of the type {array.dtype}; allowed are real numbers of up "
+                "to 64 bits: float16, float32, float64, integers and bool."
+            )
+    own = [a.dtype for x, a in zip(leaves, arrays, strict=True) if not _is_weak(x, a)]
+    types = own or [x.dtype for x in arrays]
+    return jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
+
+
+def _is_weak(leaf: Any, array: jax.Array | np.ndarray) -> bool:
+    """Whether it has no floating type of its own."""
+    of_python = isinstance(leaf, int | float) and not isinstance(leaf, np.generic)
+    return of_python or array.dtype == bool or bool(getattr(array, "weak_type", False))
 
 
 def _array(x: Any) -> Any:
@@ -192,16 +226,26 @@ def choose_doublings(column: Column, num_streams: int) -> int:
     return sufficient_doublings(max_tau, min_mu, num_streams, column.tau.dtype)
 
 
+def longest(column: Column, multiple_views: bool, after: int = 0) -> dict[str, int]:
+    """Size of each axis of one column: that of the argument that has most there.
+
+    Of arguments as they are outside, or with so many more axes `after` a column's own.
+    """
+    sizes: dict[str, int] = {}
+    for name in OWN_AXES:
+        if (x := getattr(column, name)) is not None:
+            axes, end = own_axes(name, multiple_views), x.ndim - after
+            for axis, size in zip(axes, x.shape[end - len(axes) : end], strict=True):
+                sizes[axis] = max(size, sizes.get(axis, 0))
+    return sizes
+
+
 def aligned(column: Column, multiple_views: bool) -> Column:
     """A column whose batch is last in every leaf, with all its own axes.
 
     A single view gets its axis; an argument shared by layers or views gets one entry for each.
     """
-    num_layers = max(column.tau.shape[0], column.ssa.shape[0], column.moments.shape[0])
-    num_views = 1
-    if multiple_views:
-        num_views = max(x.shape[0] for x in (column.mu, column.relative_azimuth))
-    sizes = {"layer": num_layers, "view": num_views}
+    sizes = {"view": 1} | longest(column, multiple_views, after=1)
 
     def inward(name: str, x: jax.Array) -> jax.Array:
         axes = OWN_AXES.get(name, ())

@@ -19,6 +19,7 @@ from .column import (
     aligned,
     check_shapes,
     choose_doublings,
+    longest,
     names,
     own_axes,
 )
@@ -128,9 +129,7 @@ class _Program(NamedTuple):
 
     def own_result(self, leaves: Leaves) -> Any:
         column = jax.tree.unflatten(self.structure, leaves)
-        views = ()
-        if self.multiple_views:
-            views = (max(column.mu.shape[-1], column.relative_azimuth.shape[-1]),)
+        views = (longest(column, True)["view"],) if self.multiple_views else ()
         dtype = jnp.result_type(*leaves)
         return jax.tree.map(
             lambda has: jax.ShapeDtypeStruct(views if has else (), dtype), self.by_view

@@ -21,6 +21,7 @@ from abi_operator import (
     reflectance_factor,
 )
 from abi_operator.nomenclature import QUALITY_FLAGS
+from abi_operator.state_checks import uniform
 from abi_operator.surface import Lambertian, RossLi
 
 # As in `test_reflectance`, for its programs.
@@ -231,3 +232,17 @@ def test_flags_of_angles_particles_and_grounds():
     np.testing.assert_array_equal(quality_flags(liquid, BANDS), expected)
     share = outside_fitted_range(liquid, BANDS)
     np.testing.assert_array_equal(share, [[0, 0]] * 3 + [[1, 1]] + [[0, 0]] * 2)
+
+
+def test_fields_have_one_real_type():
+    """That of the arrays, whatever a transformation makes of a number; others are refused by
+    name."""
+    state = jax.tree.map(lambda x: np.asarray(x, np.float32), column(num_layers=LAYERS))
+
+    def with_albedo(x):
+        return uniform(eqx.tree_at(lambda s: s.albedo["C02"], state, x))[0]
+
+    found = jax.eval_shape(with_albedo, 0.3)
+    assert {leaf.dtype for leaf in jax.tree.leaves(found)} == {np.dtype(np.float32)}
+    with pytest.raises(TypeError, match=r"state\.albedo\['C02'\] is of the type bfloat16; allowed"):
+        with_albedo(jnp.zeros((), jnp.bfloat16))

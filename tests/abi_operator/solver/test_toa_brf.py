@@ -10,7 +10,8 @@ from cdisort import cdisort_brf
 from columns import STANDARD, simple_columns, standard_columns
 from programs import programs_anew
 
-from abi_operator.solver import toa_brf
+from abi_operator.solver import toa_albedo, toa_brf
+from abi_operator.solver.column import aligned, promoted
 from abi_operator.solver.method import doublings
 
 # A few hundred products and inverses of well-conditioned matrices.
@@ -232,6 +233,88 @@ def test_other_float_types_are_promoted_together():
     # A Python number follows the arrays.
     found = jax.eval_shape(lambda *x: toa_brf(*x[:3], 0.1, *x[3:], **STANDARD), *single)
     assert found.dtype == jnp.float32
+
+
+def shared(dtype="float32", **changed):
+    """Three columns of one layer, of two streams."""
+    given = {
+        "tau": np.full((3, 1), 0.3, dtype),
+        "ssa": np.full((3, 1), 0.5, dtype),
+        "moments": np.asarray([[1, 0.5, 0.1]], dtype),
+        "albedo": np.asarray(0.1, dtype),
+        "mu0": np.asarray(0.5, dtype),
+        "mu": np.asarray(0.6, dtype),
+        "relative_azimuth": np.asarray(1, dtype),
+        "phase_function": np.ones(1, dtype),
+    }
+    return given | changed
+
+
+def of_shared(num_doublings=2, **options):
+    return toa_brf(**options, num_streams=2, num_doublings=num_doublings)
+
+
+def test_python_numbers_follow_the_arrays_under_transformations():
+    """They are arrays of JAX there, of double precision; alone they have the usual one."""
+    given = shared()
+
+    def of_albedo(albedo):
+        found = of_shared(**given | {"albedo": albedo})
+        assert found.dtype == jnp.float32
+        return jnp.sum(found)
+
+    jax.eval_shape(jax.grad(of_albedo), 0.3)
+    jax.eval_shape(of_albedo, jnp.asarray(0.3))
+    numbers = jax.eval_shape(lambda: of_shared(**jax.tree.map(as_full, given)))
+    assert numbers.dtype == jnp.result_type(float)
+    plane = {name: given[name] for name in ("tau", "ssa", "moments", "albedo", "mu0")}
+    found = jax.eval_shape(lambda: toa_albedo(**jax.tree.map(as_full, plane), num_streams=2))
+    assert found.dtype == jnp.result_type(float)
+
+
+def as_full(x):
+    """Zeros without a type of their own."""
+    return jnp.full(x.shape, 0.0)
+
+
+@pytest.mark.parametrize("dtype", [jnp.bfloat16, np.complex128, np.longdouble])
+def test_other_types_are_refused(dtype):
+    """By name, where they have no floating type in common with the others."""
+    if np.dtype(dtype) == np.float64:
+        pytest.skip("long double is double here")
+    message = f"mu0 is of the type {np.dtype(dtype)}; allowed are .* up to 64 bits"
+    with pytest.raises(TypeError, match=message):
+        of_shared(**shared(mu0=np.asarray(0.5, dtype)))
+
+
+def test_layers_and_views_are_as_many_as_any_argument_has():
+    """Others are stretched."""
+    given = shared() | {"secant": np.asarray([2.0, 2.1, 2.2], np.float32)}
+    column = aligned_alone(given, multiple_views=False)
+    layers = column.tau, column.ssa, column.moments, column.secant, column.phase_function
+    assert [len(x) for x in layers] == [3] * 5
+    angles = {name: given[name][None] for name in ("mu", "relative_azimuth")}
+    of_views = given | angles | {"phase_function": np.ones((1, 5), np.float32)}
+    found = jax.eval_shape(lambda: of_shared(**of_views, multiple_views=True))
+    assert found.shape == (3, 5)
+    column = aligned_alone(of_views, multiple_views=True)
+    assert column.phase_function.shape == (3, 5, 1)
+    assert column.mu.shape == column.relative_azimuth.shape == (5, 1)
+
+
+def aligned_alone(given, multiple_views):
+    """The first column, with an axis for the batch."""
+    one = given | {name: given[name][0] for name in ("tau", "ssa")}
+    return aligned(jax.tree.map(lambda x: x[..., None], promoted(**one)), multiple_views)
+
+
+def test_all_scattered_light_goes_straight_on():
+    """Where every moment is 1 a layer only absorbs; slopes are finite."""
+    given = shared("float64", moments=np.ones((1, 3)), phase_function=np.zeros(1))
+    total, slopes = jax.value_and_grad(lambda given: jnp.sum(of_shared(**given)))(given)
+    wanted = 3 * 0.1 * np.exp(-0.5 * 0.3 * (1 / 0.5 + 1 / 0.6))
+    np.testing.assert_allclose(total, wanted, rtol=ROUNDING)
+    assert all(np.all(np.isfinite(x)) for x in slopes.values())
 
 
 @pytest.mark.parametrize(
