@@ -3,7 +3,7 @@
 `check_in_memory` is made of every call whose arguments lie in memory, so it must take next to no
 time: it reads each array once, as integers, and looks closer only where that leaves a doubt.
 `check_arguments` is what looks closer. The first argument that offends is reported, in the order of
-the call.
+`column.Column`.
 """
 
 from functools import cache

@@ -22,7 +22,8 @@ class Settings(NamedTuple):
         views of the same columns; the result keeps it. Many views cost little more than one.
     num_doublings
         Doublings of a layer at most (see `layer.half_layer`): each has as many as it needs up to
-        that, and too small a number is an error that nothing reports. None sets no limit; in
+        that, and too small a number is an error that nothing reports. With an error budget it is
+        one of groups of layers, which may be thicker than any that is given. None sets no limit; in
         programs for slopes it is what the largest layer needs where the arguments are concrete,
         and where they are traced what one of 1e5 needs under a sun at a cosine of 1e-3: columns
         with a layer that needs more are NaN there, values and slopes.

@@ -50,7 +50,8 @@ def reflecting(
     r"""Admittance :math:`2(1+R)^{-1} - 1` of any reciprocal ground in azimuth mode m.
 
     R_ij = 2 r_i r_j rho_m (-1)^m with r = `isotropic`. Its sun -> view entry is 0: light that the
-    ground alone sends from the sun to a view is added exactly (`single_scatter.direct_reflection`).
+    ground alone sends from the sun to a view is added exactly, by what air lets pass
+    (`single_scatter.direct_transmission`).
     """
     r = isotropic(num_streams, beams)
     nodes = jnp.asarray(double_gauss(num_streams)[0], beams.dtype)
