@@ -12,6 +12,7 @@ from ..method.doublings import Doublings, layer_doublings
 from ..method.mode_layers import Layers, read
 from . import budget
 from .budget import Expected
+from .depths import depths
 from .grouping import Alike, Groups, Limits, grouped
 from .heat import Warm
 from .merging import Solved, handed_back, merged
@@ -63,6 +64,8 @@ class Plan(eqx.Module):
     known, error_budget
         Of the light beside the modes', and the relative error of it that may be made; None where
         all modes are solved.
+    peaked
+        1 for columns of which two modes in a row may be small by chance, else 0 (`budget.decays`).
     """
 
     layers: LayersOfModes
@@ -71,6 +74,7 @@ class Plan(eqx.Module):
     groups: Groups | None
     known: Expected | None
     error_budget: float | None = eqx.field(static=True)
+    peaked: Float[Array, "batch"] | None = None
 
     @property
     def num_groups(self) -> Any:
@@ -92,17 +96,6 @@ class Plan(eqx.Module):
         """Which columns need any mode but the mean, as far as is known before."""
         assert self.known is not None and self.error_budget is not None
         return self.known.aside > budget.OF_NO_MODES * self.error_budget * self.known.least
-
-    def peaked(self) -> Bool[Array, "batch"]:
-        """Columns of which two modes in a row may be small by chance (`budget.decays`)."""
-        degrees = self.layers.moments[1]
-        num_streams = 2 * degrees.shape[1]
-        if num_streams > budget.FITTED_TO:
-            return jnp.ones(self.layers.tau.shape[1:], bool)
-        tau, coalbedo = self.layers.tau, self.layers.coalbedo
-        backwards = jnp.maximum(-degrees[:, -1] / (2 * num_streams - 1), 0)
-        backwards, scattered = (jnp.sum(x * tau, axis=0) for x in (backwards, 1 - coalbedo))
-        return backwards > budget.BACKWARD * scattered
 
     def share(
         self, light: Float[Array, "*view batch"], size: Float[Array, "batch"]
@@ -175,7 +168,18 @@ def planned(
     share = budget.OF_DOUBLINGS if warm is None else budget.OF_DOUBLINGS_WARM
     error, single = share * error_budget, budget.rounds(error_budget)
     doublings = layer_doublings(layers.tau, secants, num_streams, most, error, single)
-    return Plan(layers, doublings, given, groups, known, error_budget)
+    return Plan(layers, doublings, given, groups, known, error_budget, _peaked(given))
+
+
+def _peaked(layers: LayersOfModes) -> Float[Array, "*batch"]:
+    degrees = layers.moments[1]
+    num_streams = 2 * degrees.shape[1]
+    if num_streams > budget.FITTED_TO:
+        return jnp.ones_like(layers.tau[0])
+    backwards = jnp.maximum(-degrees[:, -1] / (2 * num_streams - 1), 0)
+    of_these = depths(layers.tau, layers.coalbedo, backwards, layers.sun_secants)
+    some = of_these.backward > budget.BACKWARD * (of_these.tau - of_these.absorbed)
+    return some.astype(layers.tau.dtype)
 
 
 def _middle(layers: LayersOfModes) -> Float[Array, "layer *batch"] | None:
@@ -251,7 +255,8 @@ def over_modes(
     tau = plan.layers.tau[0]
     latest, earlier = budget.decays()
     before = (jnp.full_like(tau, jnp.inf),) * 2
-    beyond, peaked = plan.beyond_the_mean(), plan.peaked()
+    beyond, peaked = plan.beyond_the_mean(), plan.peaked
+    assert peaked is not None
     counts = jnp.where(beyond | (start == 0), jnp.ones_like(tau), 0)
 
     def unsettled(state):
@@ -265,7 +270,9 @@ def over_modes(
         rows = jax.tree.map(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
-        wanting = (share > 1) | (latest * before[0] > 1) | (peaked & (earlier * before[1] > 1))
+        wanting = (
+            (share > 1) | (latest * before[0] > 1) | ((peaked > 0) & (earlier * before[1] > 1))
+        )
         before = share, before[0]
         return m + 1, carry, rows, before, jnp.where(wanting & beyond, counts, 0)
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from abi_operator.solver import slant_path_secant, toa_brf
-from abi_operator.solver.method.doublings import Doublings, reaches
+from abi_operator.solver.method.doublings import reaches
 from abi_operator.solver.skipping.budget import Expected
 from abi_operator.solver.skipping.grouping import Alike, Limits, grouped
 from abi_operator.solver.skipping.merging import Solved, handed_back, merged
-from abi_operator.solver.skipping.plan import LayersOfModes, Plan, over_modes
+from abi_operator.solver.skipping.plan import LayersOfModes, over_modes, planned
 
 # Rounding of sums in another order.
 ROUNDING = 1e-13
@@ -284,12 +284,12 @@ def test_layers_are_merged_by_the_sun_that_they_see():
 
 def modes_that_count(last_moment, shares):
     """Of a column of one layer with this last moment, whose modes are such shares of the budget."""
-    one = np.ones((1, 1))
+    one = jnp.ones((1, 1))
     moments = 0 * one[None], (2 * STREAMS - 1) * last_moment * one[None]
-    moments = tuple(np.repeat(x, STREAMS // 2, axis=1) for x in moments)
+    moments = tuple(jnp.repeat(x, STREAMS // 2, axis=1) for x in moments)
     layers = LayersOfModes(one, 0 * one, one, moments)
     known = Expected(one, one[0], one[0], 1e9 * one[0], one[0])
-    plan = Plan(layers, Doublings(None, 0), layers, None, known, 1e-3)
+    plan = planned(layers, one, known, 1e-3, None)
 
     def body(carry, share, counts):
         return carry, counts, share
