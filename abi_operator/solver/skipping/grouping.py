@@ -135,15 +135,14 @@ def _without_slopes(alike: Alike, limits: Limits):
 
 
 class _Group(NamedTuple):
-    """The group that layers join: sums over its members, what it has lost, what lies above; and of
-    those that emit the Planck function at its upper face, and how far from it that is anywhere."""
+    """The group that layers join: sums over its members, `others` those of the moments and secants
+    that are looked at; what it has lost, what lies above; and of those that emit the Planck
+    function at its upper face, and how far from it that is anywhere."""
 
     tau: Array
     scattered: Array
     forward: Array
-    further: Array | None
-    second: Array | None
-    slant: Array | None
+    others: tuple[Array | None, ...]
     lost: Array
     above: Array
     label: Array
@@ -160,13 +159,14 @@ def _labels(alike: Alike, slant, allowed, thickest, turned, cosine):
         often = 1 + _DIFFUSED * jnp.maximum(*sent_back)
         absorbing = often * jnp.abs(group.scattered - w * depth)
         turning = jnp.abs(group.forward - f * depth)
-        if group.second is not None:
-            turning = jnp.maximum(turning, jnp.abs(group.second - p * depth))
+        further, second, slant_of_sun = group.others
+        if second is not None:
+            turning = jnp.maximum(turning, jnp.abs(second - p * depth))
         difference = absorbing + turning
-        if group.further is not None:
-            difference = difference + jnp.abs(group.further - q * depth)
-        if group.slant is not None:
-            difference = difference + cosine * jnp.abs(group.slant - sun * depth)
+        if further is not None:
+            difference = difference + jnp.abs(further - q * depth)
+        if slant_of_sun is not None:
+            difference = difference + cosine * jnp.abs(slant_of_sun - sun * depth)
         hidden = (1 + slant * depth) * (1 + slant * total) * (1 + ATTENUATION * group.above)
         loss = 0.5 * difference * slant * slant * t / hidden
         if alike.light is not None:
@@ -184,12 +184,7 @@ def _labels(alike: Alike, slant, allowed, thickest, turned, cosine):
             total,
             group.scattered + w * t,
             group.forward + f * t,
-            *(
-                None if x is None else x + y * t
-                for x, y in zip(
-                    (group.further, group.second, group.slant), (q, p, sun), strict=True
-                )
-            ),
+            jax.tree.map(lambda x, y: x + y * t, group.others, (q, p, sun)),
             lost,
             group.above,
             group.label,
@@ -197,8 +192,8 @@ def _labels(alike: Alike, slant, allowed, thickest, turned, cosine):
             span,
         )
         above = group.above + sent_back[0]
-        own = (None if x is None else x * t for x in (q, p, sun))
-        fresh = _Group(t, w * t, f * t, *own, 0 * t, above, group.label + 1, start, own_span)
+        own = jax.tree.map(lambda x: x * t, (q, p, sun))
+        fresh = _Group(t, w * t, f * t, own, 0 * t, above, group.label + 1, start, own_span)
         group = jax.tree.map(lambda x, y: jnp.where(new, x, y), fresh, joined)
         return group, group.label
 
@@ -208,9 +203,9 @@ def _labels(alike: Alike, slant, allowed, thickest, turned, cosine):
     warmth = (None, None) if planck is None else (planck[0], jnp.abs(planck[1] - planck[0]))
     # Numbers of groups are those of a tile: a column that is no number has them, too.
     some = alike.further, alike.second, alike.sun_secants
-    own = (None if x is None else x[0] * t for x in some)
-    start = _Group(t, w * t, f * t, *own, 0 * t, 0 * t, jnp.zeros_like(t), *warmth)
-    rest = tuple(None if x is None else x[1:] for x in some)
+    own = jax.tree.map(lambda x: x[0] * t, some)
+    start = _Group(t, w * t, f * t, own, 0 * t, 0 * t, jnp.zeros_like(t), *warmth)
+    rest = jax.tree.map(lambda x: x[1:], some)
     layers = tau[1:], alike.scattered[1:], alike.forward[1:], rest, faces
     _, labels = jax.lax.scan(step, start, layers)
     return jnp.concatenate([start.label[None], labels])
