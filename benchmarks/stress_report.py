@@ -31,7 +31,7 @@ LIMITED_BY = dict.fromkeys(CHECKS, "rounding") | {
     "reciprocity": DEPTH,
     "slope": "the quotient: rounding of values over its step",
     "inside jit": DEPTH + ", of light of one layer seen through them",
-    "budget": "what each way of skipping is estimated to lose, least surely of grazing views",
+    "budget": "what each way of skipping is estimated to lose",
     "float32": "rounding, times optical depth over the cosine of the view",
     "float32 slope": "rounding, times optical depth over the cosine of the view",
 }

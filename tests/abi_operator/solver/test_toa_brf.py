@@ -121,7 +121,7 @@ def test_doublings_chosen_from_the_data_equal_more_of_them(monkeypatch):
     thick[0][2:] = 1e4
     np.testing.assert_allclose(brf(thick, **options)[:2], chosen[:2], rtol=SPLIT)
     programs_anew(monkeypatch)
-    monkeypatch.setattr(doublings, "_reach", lambda k, _, reach=doublings._reach: reach(k) / 4**4)
+    monkeypatch.setattr(doublings, "_reach", lambda k, *_, reach=doublings._reach: reach(k) / 4**4)
     more = brf(columns, **options)
     assert np.any(more != chosen)
     np.testing.assert_allclose(more, chosen, rtol=SPLIT)
