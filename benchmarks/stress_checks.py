@@ -63,7 +63,7 @@ LIMITS = {
     "slopes inside jit": (1e-6, 2e-2),
     "budget": (np.inf, np.inf),
     "float32": (np.inf, 2e-2),
-    "float32 slope": (np.inf, 5e-2),
+    "float32 slope": (np.inf, 0.3),
 }
 
 
