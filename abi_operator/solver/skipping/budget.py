@@ -46,10 +46,12 @@ of a high degree are much the same in every mode, and many small ones add up to 
 OF_NO_MODES = 0.1
 """Share of the budget below which all modes but the mean are expected to stay."""
 DECAY = 0.3
-"""Ratio of neighbouring modes' sizes, to see a small one by chance for what it is."""
+"""Ratio of neighbouring modes' sizes, to see a small one by chance for what it is: its neighbour
+counts, times this, as well as itself, and where phase functions have peaks the one beside that,
+times its square (`plan.Plan`)."""
 BACKWARD = 0.05
 """Share of what scatters, times its last moment where that is below 0, from which phase functions
-have a peak backwards (`decays`)."""
+have a peak backwards."""
 SINGLE_FROM = 1e-4
 """Budget from which values have all modes but the mean in single precision (`method.rounding`)."""
 OF_SLOPES = 2e-3
@@ -150,17 +152,6 @@ def of_modes(num_streams: int) -> float:
     they are small: above `FITTED_TO` the share falls with the square of the streams.
     """
     return OF_MODES * min(1.0, (FITTED_TO / num_streams) ** 2)
-
-
-def decays() -> tuple[float, ...]:
-    """What the modes before, the latest first, may have decayed by: a small mode beside them is so
-    by chance.
-
-    Two in a row may be where phase functions have peaks, whose modes hardly decay: forward ones
-    that `FITTED_TO` streams do not resolve, and backward ones (`BACKWARD`), of which delta-M leaves
-    all that they are. Elsewhere the first counts alone.
-    """
-    return DECAY, DECAY**2
 
 
 def rounds(error_budget: float | None) -> bool:

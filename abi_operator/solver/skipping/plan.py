@@ -65,7 +65,8 @@ class Plan(eqx.Module):
         Of the light beside the modes', and the relative error of it that may be made; None where
         all modes are solved.
     peaked
-        1 for columns of which two modes in a row may be small by chance, else 0 (`budget.decays`).
+        1 for columns of which two modes in a row may be small by chance, else 0: their phase
+        functions have peaks, whose modes hardly decay. None where all modes are solved.
     """
 
     layers: LayersOfModes
@@ -172,6 +173,8 @@ def planned(
 
 
 def _peaked(layers: LayersOfModes) -> Float[Array, "*batch"]:
+    """1 for columns of phase functions with forward peaks that `budget.FITTED_TO` streams do not
+    resolve, or with backward ones, of which delta-M leaves all that they are."""
     degrees = layers.moments[1]
     num_streams = 2 * degrees.shape[1]
     if num_streams > budget.FITTED_TO:
@@ -253,7 +256,7 @@ def over_modes(
         carry, found = jax.lax.scan(lambda c, mode: body(c, mode, 1.0)[:2], carry, rest)
         return carry, found
     tau = plan.layers.tau[0]
-    latest, earlier = budget.decays()
+    latest, earlier = budget.DECAY, budget.DECAY**2
     before = (jnp.full_like(tau, jnp.inf),) * 2
     beyond, peaked = plan.beyond_the_mean(), plan.peaked
     assert peaked is not None
