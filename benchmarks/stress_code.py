@@ -14,7 +14,7 @@ import jax
 import abi_operator
 
 PACKAGE = Path(abi_operator.__file__).parent
-ROOTS = ("stress_columns.py", "stress_checks.py")
+ROOTS = ("stress_columns.py", "stress_directions.py", "stress_checks.py")
 
 
 def state_of_code() -> str:

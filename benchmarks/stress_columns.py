@@ -19,6 +19,23 @@ from abi_operator.satellites import solar_irradiance
 from abi_operator.solver import double_gauss
 
 SEED = 20261125
+# Streams, layers at most and at least, whether they emit, columns of a batch, share of all columns.
+# What takes longest to compile comes first.
+GROUPS = (
+    (64, 4, 2, False, 8, 0.0005),
+    (32, 16, 5, False, 51, 0.0045),
+    (16, 16, 5, False, 119, 0.0150),
+    (16, 16, 5, True, 119, 0.0075),
+    (16, 64, 17, False, 119, 0.0225),
+    (8, 200, 65, False, 510, 0.10),
+    (8, 4, 1, True, 1020, 0.10),
+    (8, 16, 5, False, 1020, 0.15),
+    (4, 16, 5, True, 1020, 0.15),
+    (6, 4, 1, False, 1020, 0.15),
+    (4, 64, 17, False, 1020, 0.10),
+    (2, 16, 5, False, 1020, 0.10),
+    (2, 1, 1, False, 1020, 0.10),
+)
 # Property and extreme that a stratum holds.
 STRATA = {
     "ordinary": {},
@@ -102,6 +119,13 @@ def draw(key, count, num_streams, num_layers, fewest, emitting):
     return Batch(columns, stratum, further)
 
 
+def columns_of(group, index, precision):
+    """Batch of a group by its number; see `GROUPS`."""
+    streams, layers, fewest, emitting, size, _ = group
+    batch = draw([streams, layers, int(emitting), index], size, streams, layers, fewest, emitting)
+    return batch if precision == "float64" else batch.single()
+
+
 def _modes(rng, name, stratum, shape):
     """What a property is like in every layer: "" where ordinary."""
     every = EXTREMES[name]
@@ -122,7 +146,7 @@ def _tau(rng, mode):
     def between(low, high):
         return 10 ** rng.uniform(low, high, mode.shape)
 
-    thin = np.where(rng.random(mode.shape) < 0.5, between(-15, -6), 0)
+    thin = np.where(rng.random(mode.shape) < 0.5, between(-15, -3), 0)
     thin = np.where(rng.random(mode.shape) < 0.1, 1e-15, thin)
     thick = np.where(rng.random(mode.shape) < 0.2, THICKEST, between(1, 5))
     even = np.arange(mode.shape[1]) % 2 == 0
@@ -135,7 +159,7 @@ def _tau(rng, mode):
 
 
 def _ssa(rng, mode):
-    small = np.where(rng.random(mode.shape) < 0.4, 0, 10 ** rng.uniform(-12, -2, mode.shape))
+    small = np.where(rng.random(mode.shape) < 0.4, 0, 10 ** rng.uniform(-12, 0, mode.shape))
     small = np.where(rng.random(mode.shape) < 0.1, 1e-12, small)
     near = 1 - 10 ** rng.uniform(-15, -3, mode.shape)
     near = np.where(rng.random(mode.shape) < 0.4, 1, near)
@@ -148,24 +172,29 @@ def _ssa(rng, mode):
 
 
 def _angles(rng, mode, num_streams):
+    """Half of those that are equal, at nodes or vertical are so, half a little less."""
     count = mode.size
     mu0, mu = rng.uniform(0.05, 1, (2, count))
     azimuth = rng.uniform(0, np.pi, count)
     special = rng.choice([0.0, np.pi], count)
     azimuth = np.where(rng.random(count) < 0.2, special, azimuth)
+    way = rng.choice([-1, 0, 1], count, p=[0.05, 0.9, 0.05])  # the other way round, or a turn more
+    azimuth = np.where((way > 0) & (azimuth > 0.1), 2 * np.pi - azimuth, azimuth)
+    azimuth = np.where(way < 0, -azimuth, azimuth)
+    beside = np.where(rng.random(count) < 0.5, 1, 1 - 10 ** rng.uniform(-12, -3, count))
     low, which = mode == "low", rng.integers(3, size=count)
     grazing = np.where(rng.random((2, count)) < 0.3, LOWEST, 10 ** rng.uniform(-3, -1, (2, count)))
     mu0 = np.where(low & (which != 1), grazing[0], mu0)
     mu = np.where(low & (which != 0), grazing[1], mu)
     nodes = double_gauss(num_streams)[0]
     at = mode == "nodes"
-    mu0 = np.where(at & (which != 1), rng.choice(nodes, count), mu0)
-    mu = np.where(at & (which != 0), rng.choice(nodes, count), mu)
+    mu0 = np.where(at & (which != 1), beside * rng.choice(nodes, count), mu0)
+    mu = np.where(at & (which != 0), beside * rng.choice(nodes, count), mu)
     vertical = mode == "vertical"
-    mu0 = np.where(vertical & (which != 1), 1, mu0)
-    mu = np.where(vertical & (which != 0), 1, mu)
+    mu0 = np.where(vertical & (which != 1), beside, mu0)
+    mu = np.where(vertical & (which != 0), beside, mu)
     equal = mode == "equal"
-    mu = np.where(equal, mu0, mu)
+    mu = np.where(equal, beside * mu0, mu)
     azimuth = np.where(equal & (which != 0), 0, azimuth)  # exact backscatter, the glory
     return mu0, mu, azimuth
 

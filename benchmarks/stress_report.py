@@ -3,25 +3,9 @@
 import numpy as np
 from rounds import table
 from stress_checks import CHECKS, LIMITS
-from stress_columns import STRATA
+from stress_columns import GROUPS, STRATA
 
 PRECISIONS = ("float64", "float32")
-# Streams, layers at most and at least, whether they emit, columns of a batch, share of all columns.
-# What takes longest to compile comes first.
-GROUPS = (
-    (64, 4, 2, False, 8, 0.0005),
-    (32, 16, 5, False, 51, 0.0045),
-    (16, 16, 5, False, 119, 0.0225),
-    (16, 64, 17, False, 119, 0.0225),
-    (8, 200, 65, False, 510, 0.10),
-    (8, 4, 2, True, 1020, 0.10),
-    (8, 16, 5, False, 1020, 0.15),
-    (4, 16, 5, True, 1020, 0.15),
-    (6, 4, 2, False, 1020, 0.15),
-    (4, 64, 17, False, 1020, 0.10),
-    (2, 16, 5, False, 1020, 0.10),
-    (2, 1, 1, False, 1020, 0.10),
-)
 # What the worst error of a check comes from, where nothing fails.
 DEPTH = "rounding, times the depth of layers that absorb nothing"
 LIMITED_BY = dict.fromkeys(CHECKS, "rounding") | {
@@ -30,10 +14,12 @@ LIMITED_BY = dict.fromkeys(CHECKS, "rounding") | {
     "energy": DEPTH,
     "reciprocity": DEPTH,
     "slope": "the quotient: rounding of values over its step",
+    "partial": "the quotient, likewise",
     "inside jit": DEPTH + ", of light of one layer seen through them",
     "budget": "what each way of skipping is estimated to lose",
     "float32": "rounding, times optical depth over the cosine of the view",
     "float32 slope": "rounding, times optical depth over the cosine of the view",
+    "float32 partial": "rounding, times optical depth over the cosine of the view",
 }
 SIGNS = ("not negative", "rising in albedo")
 
@@ -88,6 +74,12 @@ def worst(rows, precision, count):
     ratio = np.zeros(rows.size)
     for name, limits in LIMITS.items():
         limit = limits[PRECISIONS.index(precision)]
-        if 0 < limit < np.inf and name not in ("budget", "slope", "float32 slope"):
+        if 0 < limit < np.inf and name not in (
+            "budget",
+            "slope",
+            "partial",
+            "float32 slope",
+            "float32 partial",
+        ):
             ratio = np.maximum(ratio, np.nan_to_num(rows[name]) / limit)
     return np.argsort(-ratio, kind="stable")[:count]

@@ -44,9 +44,9 @@ def error(columns, row, num_streams, value):
 
 
 def falls(columns, row, num_streams):
-    """Whether the equations themselves have a negative reflectance, or one that falls in albedo.
+    """How far the equations themselves have a reflectance below 0, or one that falls in albedo.
 
-    Few streams have, where phase functions are sharp.
+    Few streams have, where phase functions are sharp. 0 where they have neither.
     """
     black, own, white = (truth(columns, row, num_streams, a) for a in (0.0, None, 1.0))
-    return bool(black < 0 or black > own or own > white)
+    return max(-black, black - own, own - white, 0.0)
