@@ -4,7 +4,11 @@ import re
 from pathlib import Path
 
 import numpy as np
+import stress_columns
 from readme import README, run_block
+
+from abi_operator.files.fires import _ALLOWED as FIRES
+from abi_operator.ranges import SOLVER, STATE, WEATHER
 
 ROOT = Path(__file__).parents[1]
 
@@ -35,3 +39,34 @@ def test_the_test_line_is_the_one_of_the_full_check():
 def test_files_and_commands_that_it_names_exist():
     for name in re.findall(r"(?:examples|tests|benchmarks|abi_operator)/[\w/]+\.\w+", README):
         assert (ROOT / name).exists(), name
+
+
+def test_its_ranges_are_those_that_are_checked():
+    rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \| [^|]+ \|$", README, re.MULTILINE))
+    assert {name: rows[name] for name in SOLVER} == {name: x.words for name, x in SOLVER.items()}
+    (said,) = re.findall(r"^\| `temperature` of a fire \| ([^|]+) \|", README, re.MULTILINE)
+    assert said == FIRES["temperature"].words
+    (said,) = re.findall(r"^\| `temperature` of the air \| ([^|]+) \|", README, re.MULTILINE)
+    assert said == WEATHER["temperature"].words
+    for name in ("surface_temperature", "mass_path", "wind_speed"):
+        assert f"| `{name}` | {WEATHER[name].words} |" in README
+    assert f"| zenith angles of sun and view | {STATE['solar_zenith'].words} |" in README
+
+
+def test_columns_reach_what_it_says_was_asked():
+    columns = [stress_columns.draw([0, i], 400, 2, 4, 1, True).columns for i in range(3)]
+    found = {name: np.concatenate([x[name] for x in columns]) for name in columns[0]}
+    tau, ssa = found["tau"], found["ssa"]
+    assert tau.max() == 1e5 and {0.0, 1e-15} <= set(tau.ravel())
+    assert {0.0, 1e-12, 1 - 1e-15, 1.0} <= set(ssa.ravel())
+    np.testing.assert_allclose(found["moments"][..., 1].min(), -0.9)
+    np.testing.assert_allclose(found["moments"][..., 1].max(), 0.999)
+    for name, (low, high) in {"albedo": (0, 1), "mu0": (1e-3, 1), "mu": (1e-3, 1)}.items():
+        assert found[name].min() == low and found[name].max() == high
+    assert -np.pi <= found["relative_azimuth"].min() < -3
+    assert 6 < found["relative_azimuth"].max() <= 2 * np.pi
+    coldest, hottest = stress_columns.black_body(np.array([200.0, 1500.0]))
+    for name in ("planck_levels", "surface_emission", "isotropic_top"):
+        assert found[name].max() <= hottest
+    assert coldest <= found["planck_levels"].min() < 2 * coldest
+    assert max(layers for _, layers, *_ in stress_columns.GROUPS) == 200

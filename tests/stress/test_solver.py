@@ -8,7 +8,7 @@ import stress_truth
 from stress_checks import LIMITS, Judged, refused, value
 from stress_code import PACKAGE, sources
 from stress_columns import STRATA
-from stress_report import SIGNS, failed
+from stress_report import failed
 
 # Streams, layers at most and at least, whether they emit, columns: few streams, for a program takes
 # longer to compile than its columns to solve.
@@ -130,15 +130,3 @@ def test_a_batch_that_is_there_is_not_made_again(tmp_path):
     assert len(seconds) == 1
     assert [path.read_bytes() for path in names] == whole
     assert sorted(tmp_path.iterdir()) == sorted(names)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("precision", stress.PRECISIONS)
-@pytest.mark.parametrize("group", stress.GROUPS, ids=lambda g: f"{g[0]}x{g[1]}{'e' * g[3]}")
-def test_nothing_fails_among_thousands(group, precision, scale):
-    if scale < 1 and (group[0] > 8 or group[1] > 16):
-        pytest.skip("programs of many streams and layers take minutes to compile")
-    for index in range(stress.batches(group, scale * 20_000)):
-        found = wrong(group, index, precision)
-        # Of signs the benchmark asks 40 digits: with few streams the equations have wrong ones.
-        assert {name: x for name, x in found.items() if name not in SIGNS} == {}
