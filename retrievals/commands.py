@@ -23,6 +23,7 @@ from .fires import BACKGROUNDS
 from .images import REFLECTIVE
 from .kinds import KINDS, retrieve_kind, retrieve_smoke, vector_of
 from .prior_file import DECLARED, read_prior
+from .product_file import read_retrieval
 from .scoring import format_report, score_retrieval
 
 RETRIEVAL = "retrieval.nc"
@@ -176,7 +177,7 @@ def score(
         one_sentence(),
         reading(f"{result} or {retrieval}"),
         read_result(result) as truth,
-        _open_retrieval(retrieval) as retrieved,
+        read_retrieval(retrieval) as retrieved,
     ):
         report = score_retrieval(truth, retrieved)
         if csv is not None:
@@ -206,7 +207,8 @@ def finish_demo(folder: Path) -> None:
     Reads ``result.nc`` in `folder`, writes ``retrieval.nc`` and ``scores.csv`` beside it and prints
     the scores. Trouble with the result is an `InputError`.
     """
-    with read_result(folder / "result.nc") as result:
+    path = folder / "result.nc"
+    with reading(str(path)), read_result(path) as result:
         typer.echo("retrieving smoke from the simulated reflectances")
         retrieval = retrieve_smoke(result)
         report = score_retrieval(result, retrieval)
@@ -235,16 +237,3 @@ def _write_csv(report: xr.Dataset, path: Path) -> None:
     dims = [dim for dim in ("group", "code", "detection") if dim in report.dims]
     tables = [report.drop_dims(set(dims) - {dim}).to_dataframe() for dim in dims]
     path.write_text("\n".join(table.to_csv() for table in tables))
-
-
-def _open_retrieval(path: Path) -> xr.Dataset:
-    if not path.is_file():
-        raise InputError(f"{path} does not exist or is not a file; check the path.")
-    try:
-        dataset = xr.open_dataset(path, engine="netcdf4", decode_timedelta=False)
-    except (OSError, ValueError, RuntimeError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} cannot be read as NetCDF ({error}).") from error
-    if "result_code" not in dataset:
-        dataset.close()
-        raise InputError(f"{path} has no result_code; give a file that a retrieval wrote.")
-    return dataset

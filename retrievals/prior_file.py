@@ -46,7 +46,7 @@ def read_prior(path: str, vector: StateVector) -> StateVector:
         return vector
     try:
         tables = tomllib.loads(Path(path).read_text())
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # integers of any length, deep brackets
         raise InputError(f"the prior {path} cannot be read ({error}).") from error
     unknown = [name for name in tables if name not in vector.names]
     if unknown:

@@ -130,6 +130,14 @@ def load(array: xr.DataArray, path: FilePath) -> np.ndarray:
         ) from error
 
 
+def load_all(dataset: xr.Dataset, path: FilePath) -> xr.Dataset:
+    """Read all that a lazy Dataset has from disk into memory."""
+    try:
+        return dataset.load()
+    except _UNREADABLE as error:
+        raise InputError(f"{path} cannot be read ({error}); copy it again.") from error
+
+
 def load_finite(array: xr.DataArray, path: FilePath) -> np.ndarray:
     """Read the values of a lazy variable as float64, refusing missing and infinite ones."""
     values = load(array, path)

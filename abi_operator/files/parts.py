@@ -7,11 +7,13 @@ all. Which runs find it is settled by `output_folder`.
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from .abandoned import PARTS, WHOLE
+
+# Checksums guard what is in an archive, but not that all of it is there.
+_NAMES = "names_of_arrays"
 
 
 class Parts:
@@ -28,11 +30,17 @@ class Parts:
         self.num_found = 0
 
     def find(self, name: str) -> dict[str, np.ndarray] | None:
-        """A part that was kept before; None where there is none, or it cannot be read."""
+        """A part that was kept before; None where there is none, or it cannot be read.
+
+        What is not an array of numbers or letters, and would run code as it is read, is not read.
+        """
         try:
             with self._path(name).open("rb") as file, np.load(file) as arrays:
                 found = dict(arrays)
-        except (OSError, ValueError, EOFError, BadZipFile, KeyError):
+                names = found.pop(_NAMES).tolist()
+        except Exception:  # of a damaged archive also what it would need: a password, a method
+            return None
+        if names != list(found):
             return None
         self.num_found += 1
         return found
@@ -44,7 +52,7 @@ class Parts:
         unfinished = path.with_suffix(".unfinished")
         with unfinished.open("wb") as file:
             # Before NumPy 2.2 `allow_pickle` would be one of the arrays.
-            np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]
+            np.savez(file, **arrays, **{_NAMES: np.array(list(arrays), str)})  # pyright: ignore[reportArgumentType]
         os.replace(unfinished, path)
 
     def _path(self, name: str) -> Path:

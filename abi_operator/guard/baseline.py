@@ -13,6 +13,7 @@ import xarray as xr
 from .._version import __version__
 from ..bands import BANDS
 from ..files import InputError, output_folder
+from ..files.netcdf import load_all, open_netcdf
 from .comparison import (
     INPUT_TOLERANCE,
     JACOBIAN_TOLERANCE,
@@ -23,6 +24,23 @@ from .comparison import (
 )
 from .evaluation import UNITS, Jacobians, Request
 from .outputs import PIECEWISE_CONSTANT, Outputs
+
+_NUMBERS = ("value", "jacobian", "state", "output_value", "output_slope")
+_AXES = {
+    "column": ("column",),
+    "band": ("band",),
+    "input": ("input",),
+    "input_units": ("input",),
+    "quantity": ("column", "band"),
+    "value": ("column", "band"),
+    "jacobian": ("column", "band", "input"),
+    "state": ("column", "input"),
+    "output": ("output",),
+    "output_row": ("output_row",),
+    "output_units": ("output",),
+    "output_value": ("output_row", "output"),
+    "output_slope": ("output_row", "output", "band"),
+}
 
 _TITLE = "Baseline of Jacobians of abi_operator"
 _ADVICE = "give a file that 'abi-operator jacobian save' wrote"
@@ -131,13 +149,9 @@ def read_baseline(path: str | PathLike[str]) -> Baseline:
     InputError
         Where there is no such file, or it is not a baseline.
     """
-    if not Path(path).is_file():
-        raise InputError(f"{path} does not exist or is not a file; {_ADVICE}.")
-    try:
-        with xr.open_dataset(Path(path).absolute(), engine="netcdf4") as dataset:
-            dataset.load()
-    except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(f"{path} cannot be read as NetCDF ({error}); {_ADVICE}.") from error
+    with open_netcdf(path, advice=_ADVICE) as dataset:
+        load_all(dataset, path)
+    _check_shapes(dataset, path)
     try:
         attributes = dataset.attrs
         bands = json.loads(attributes["requested_bands"])
@@ -158,11 +172,37 @@ def read_baseline(path: str | PathLike[str]) -> Baseline:
         found = {name: str(attributes[f"{name}_version"]) for name in versions()}
         history = tuple(str(attributes["history"]).splitlines())
         scenario = str(attributes["scenario"])
-    except (KeyError, TypeError, ValueError) as error:
+    except KeyError as error:
         raise InputError(f"{path} is no baseline, {error} is missing; {_ADVICE}.") from error
-    if jacobians.jacobian.dtype != np.float64 or not set(jacobians.bands) <= set(BANDS):
-        raise InputError(f"{path} holds numbers or bands that no baseline has; {_ADVICE}.")
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{path} is no baseline ({error}); {_ADVICE}.") from error
+    settings = jacobians.settings, jacobians.request.settings
+    if not all(isinstance(each, dict) for each in settings):
+        raise InputError(f"{path} has settings that are no names and values; {_ADVICE}.")
+    if not set(jacobians.bands) <= set(BANDS):
+        raise InputError(f"{path} holds bands that no baseline has; {_ADVICE}.")
     return Baseline(jacobians, scenario, found, history)
+
+
+def _check_shapes(dataset: xr.Dataset, path: str | PathLike[str]) -> None:
+    """Refuse arrays of other axes or types, names that are there twice, and infinite numbers.
+
+    An infinite number would be within its own tolerance of any other.
+    """
+    for name, dims in _AXES.items():
+        if name not in dataset:
+            if name.startswith("output"):  # a file from before there were any
+                continue
+            raise InputError(f"{path} is no baseline, {name} is missing; {_ADVICE}.")
+        values = dataset[name].values
+        if dataset[name].dims != dims or (name in _NUMBERS) != (values.dtype == np.float64):
+            raise InputError(
+                f"{name} in {path} is {values.dtype} along {dataset[name].dims}; {_ADVICE}."
+            )
+        if name in _NUMBERS and np.isinf(values).any():
+            raise InputError(f"{name} in {path} is infinite somewhere; {_ADVICE}.")
+        if dims == (name,) and len(set(map(str, values))) < len(values):
+            raise InputError(f"{name} in {path} names one thing twice; {_ADVICE}.")
 
 
 def _variables(outputs: Outputs) -> dict[str, tuple[Any, ...]]:

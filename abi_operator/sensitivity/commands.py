@@ -9,6 +9,7 @@ import xarray as xr
 from ..atmosphere import Fire
 from ..commands import one_sentence, typed
 from ..files import InputError, output_folder, read_result
+from ..files.netcdf import load_all
 from . import nir_report, sensitivity_report
 from .declarations import BY_BAND, SHORT_NAMES
 from .figure_albedo import albedo_figure
@@ -246,7 +247,7 @@ def read_image(path: Path, time: int) -> xr.Dataset:
             raise InputError(
                 f"{path} has {result.sizes['time']} times, counted from 0; got --time {time}."
             )
-        return result.isel(time=time).load()
+        return load_all(result.isel(time=time), path)
 
 
 def history(context: typer.Context, image: xr.Dataset) -> str:

@@ -58,9 +58,16 @@ def scan_angles(
     sweep = str(projection.get("sweep_angle_axis", "x"))
     if sweep != "x":
         raise InputError(f"the sweep_angle_axis of ABI is x; got {sweep!r}.")
-    a, b = float(projection["semi_major_axis"]), float(projection["semi_minor_axis"])
-    distance = float(projection["perspective_point_height"]) + a
-    apart = np.radians(longitude - float(projection["longitude_of_projection_origin"]))
+    try:
+        a, b, above, origin = (float(np.squeeze(projection[name])) for name in _NEEDED)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"goes_imager_projection is not of numbers ({error}).") from error
+    if not (0 < b <= a < np.inf and 0 < above < np.inf and np.isfinite(origin)):
+        raise InputError(
+            f"goes_imager_projection is of an earth {a:g} and {b:g} m wide, seen from {above:g} m "
+            f"above {origin:g} degrees; give an ABI file."
+        )
+    distance, apart = above + a, np.radians(longitude - origin)
     geocentric = np.arctan((b / a) ** 2 * np.tan(np.radians(latitude)))
     radius = b / np.sqrt(1 - (1 - (b / a) ** 2) * np.cos(geocentric) ** 2)
     towards = distance - radius * np.cos(geocentric) * np.cos(apart)

@@ -114,29 +114,41 @@ def _radiance_file(file: xr.Dataset, path: object) -> Found:
     missing = [name for name in needed if name not in file.variables]
     if missing:
         raise InputError(f"{path} has Rad but no {', '.join(missing)}; give an L1b file of ABI.")
-    band = _band_of_file(file)
+    band = _band_of_file(file, path)
     if not _ABI_BAND.fullmatch(band.lower()):
         raise InputError(f"{path} is of band {band}, which is no reflectance; give C01 to C06.")
     check_units(file["Rad"], "W m-2 sr-1 um-1", str(path))
     distance, irradiance = (
-        float(np.ravel(file[name].values)[0])
-        for name in ("earth_sun_distance_anomaly_in_AU", "esun")
+        _constant(file, name, path) for name in ("earth_sun_distance_anomaly_in_AU", "esun")
     )
     values = np.pi * distance**2 / irradiance * _plane(file, "Rad", path)
-    return Found(band, _of_quality(file, values), False, "Rad")
+    return Found(band, _of_quality(file, values, path), False, "Rad")
 
 
-def _band_of_file(file: xr.Dataset) -> str:
-    return f"C{int(np.ravel(file['band_id'].values)[0]):02d}"
+def _band_of_file(file: xr.Dataset, path: object) -> str:
+    return f"C{int(_constant(file, 'band_id', path)):02d}"
+
+
+def _constant(file: xr.Dataset, name: str, path: object) -> float:
+    """A number of the whole file, which is above 0."""
+    values = np.ravel(load(file[name], str(path)))
+    if values.size == 0 or not 0 < values[0] < np.inf:
+        raise InputError(
+            f"{name} in {path} is {values[:1].tolist()} where a number above 0 is expected; give "
+            "the file as it was written."
+        )
+    return float(values[0])
 
 
 def _named(file: xr.Dataset, path: object) -> list[Found]:
     found = []
     if "CMI" in file and "band_id" in file.variables:
-        band = _band_of_file(file)
+        band = _band_of_file(file, path)
         if _ABI_BAND.fullmatch(band.lower()):
             check_units(file["CMI"], "1", str(path))
-            found.append(Found(band, _of_quality(file, _plane(file, "CMI", path)), False, "CMI"))
+            found.append(
+                Found(band, _of_quality(file, _plane(file, "CMI", path), path), False, "CMI")
+            )
     for label in map(str, file.data_vars):
         match = _ABI_BAND.fullmatch(label.lower()) or _MODIS_BAND.fullmatch(label.lower())
         if match is None:
@@ -166,10 +178,13 @@ def _of_one_time(array: xr.DataArray) -> xr.DataArray:
     return array.squeeze([dim for dim in array.dims[:-2] if array.sizes[dim] == 1])
 
 
-def _of_quality(file: xr.Dataset, values: np.ndarray) -> np.ndarray:
+def _of_quality(file: xr.Dataset, values: np.ndarray, path: object) -> np.ndarray:
     if "DQF" not in file.variables:
         return values
-    return np.where(file["DQF"].values.reshape(values.shape) <= _LARGEST_QUALITY, values, np.nan)
+    quality = _plane(file, "DQF", path)
+    if quality.shape != values.shape:
+        raise InputError(f"DQF in {path} has {quality.shape} pixels, its image {values.shape}.")
+    return np.where(quality <= _LARGEST_QUALITY, values, np.nan)
 
 
 def _grid(file: xr.Dataset, shape: tuple[int, ...], path: object) -> Grid:

@@ -21,6 +21,10 @@ Quantity = Literal["reflectance_factor", "brf"]
 LARGEST_DELAY = np.timedelta64(30, "m")
 """How far apart in time scene and observation may be: the sun moves by 7.5 degrees meanwhile."""
 
+SMALLEST_REFLECTANCE = -0.1
+"""What noise and the space between counts leave of the dark: radiances of ABI reach down to 0.04
+below 0, as reflectance factors. [-]"""
+
 _TOLD = ("observed_variables", "regridding", "observed_time", "error_budget")
 _TIMES = ("time_coverage_start", "time_coverage_end")
 
@@ -52,7 +56,8 @@ def read_observed(
     Returns
     -------
     xarray.Dataset
-        ``reflectance_factor`` (band, y, x), NaN where nothing was observed, and ``saturated`` (1
+        ``reflectance_factor`` (band, y, x), NaN where nothing was observed or it is above
+        `LARGEST_REFLECTANCE_FACTOR`, and ``saturated`` (1
         where a band could tell no more); attributes ``observed_files``, ``observed_variables``,
         ``regridding`` and, where the observation says so, ``observed_time``.
 
@@ -158,9 +163,16 @@ def _laid(
             f"{one.source} in {path} reaches {finite.max():.3g}, where a bright cloud has 1: it "
             "seems to be in per cent, or counts; convert it to reflectance."
         )
+    outside = np.isfinite(one.values) & (one.values < SMALLEST_REFLECTANCE)
+    if outside.any():
+        raise InputError(
+            f"{one.source} in {path} is {one.values[outside].min():.3g} somewhere, less than noise "
+            f"leaves of the dark ({SMALLEST_REFLECTANCE:g}): leave it out of the file, as missing."
+        )
     values = np.where(index >= 0, one.values.ravel()[np.maximum(index, 0)], np.nan)
     saturated = np.isposinf(values)
-    values = np.where(np.isfinite(values), values, np.nan)
+    # Beyond what is reflected the instrument tells nothing: no value, and not a large one.
+    values = np.where(np.isfinite(values) & (values <= LARGEST_REFLECTANCE_FACTOR), values, np.nan)
     if one.is_brf or (one.is_brf is None and quantity == "brf"):
         values = values * np.cos(np.radians(image["solar_zenith_angle"].values))
     return values, saturated

@@ -36,6 +36,9 @@ def test_a_file_says_mean_and_sigma_in_the_unit_of_the_quantity(tmp_path):
         ("[aod_550]\nmean = 1" + 400 * "0" + "\nsigma = 1.0", "needs numbers"),
         ("aod_550 = 3", "needs numbers mean and sigma"),
         ("[aod_550", "cannot be read"),
+        # Of more digits than Python makes an integer of, and in more brackets than it can count.
+        ("[aod_550]\nmean = 1" + 5000 * "0" + "\nsigma = 1.0", "cannot be read"),
+        ("aod_550 = " + 100_000 * "[", "cannot be read"),
     ],
 )
 def test_what_a_file_may_not_say(tmp_path, text, words):

@@ -17,51 +17,13 @@ from pathlib import Path
 
 import netCDF4
 import numpy as np
+from hostile_readers import NETCDF, READERS
 
-from abi_operator.files import (
-    InputError,
-    open_wrf_series,
-    read_mcd43a1,
-    read_plume,
-    read_result,
-    read_white_sky,
-    read_wrf,
-    reading,
-    wrf_coordinates,
-)
-from retrievals import declarations
-from retrievals.prior_file import read_prior
+from abi_operator.files import InputError
 
 SEED = 7
 MEMORY = 3 << 30  # of addresses: JAX and its threads take most of it [byte]
 SECONDS = 20  # a copy may take
-
-
-def read_model(path):
-    wrf_coordinates(path)
-    read_wrf(path, 0)
-    open_wrf_series(path)
-
-
-def read_albedo(path):
-    read_mcd43a1(path, ("C01", "C02"))
-    read_white_sky(path, ("Band1", "Band2"))
-
-
-def read_whole_result(path):
-    """As commands do, which wait with reading until they need something."""
-    with reading(str(path)), read_result(path) as result:
-        result.load()
-
-
-READERS = {
-    "wrf": read_model,
-    "mcd43": read_albedo,
-    "plume": lambda path: read_plume(path, (8, 8)),
-    "result": read_whole_result,
-    "prior": lambda path: read_prior(str(path), declarations.plume("smoke")),
-}
-NETCDF = ("wrf", "mcd43", "result")
 
 
 def damaged(original, number, kind):
@@ -126,7 +88,7 @@ def one(kind, original, number, path):
     if number % 4 == 0 and kind in NETCDF:
         rewritten(path, number)
     try:
-        READERS[kind](path)
+        nonsense = "; ".join(filter(None, (read.nonsense for read in READERS[kind](path))))
     except InputError as error:
         said = str(error)
         return ("refused", said) if said.strip() else ("failed", "an error without words")
@@ -134,7 +96,7 @@ def one(kind, original, number, path):
         last = traceback.extract_tb(error.__traceback__)
         ours = [f"{Path(x.filename).name}:{x.lineno}" for x in last if "abi_operator" in x.filename]
         return "failed", f"{type(error).__name__}: {error} at {' '.join(ours)}"
-    return "read", ""
+    return ("failed", f"read without a word: {nonsense}") if nonsense else ("read", "")
 
 
 def main():

@@ -10,49 +10,34 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-import xarray as xr
+from hostile_readers import NETCDF, READERS
+from originals import changed, write_originals
 
-from abi_operator.demo import write_demo
-from abi_operator.files import InputError, ResultWriter, read_result, read_wrf, reading
-from abi_operator.nomenclature import SCENARIO
+from abi_operator.files import (
+    InputError,
+    Parts,
+    note_files,
+    noted_files,
+    read_result,
+    read_wrf,
+    reading,
+)
+from abi_operator.guard.baseline import read_baseline
+from abi_operator.sensitivity.commands import read_image
+from retrievals.product_file import read_retrieval
 
 FORMATS = ("wrf", "mcd43", "plume", "result", "prior")
-PRIOR = "# what is known\n[aod_550]\nmean = 0.5\nsigma = 0.3\n"
-NETCDF = ("wrf", "mcd43", "result")
+FORMATS += ("fires", "observed", "radiance", "imagery", "retrieval", "baseline", "part")
 HUNG = f"ended with {-signal.SIGALRM}:"
 HOSTILE = Path(__file__).with_name("hostile.py")
 ROOT = Path(__file__).parents[2]
-SIZES = {"band": 2, "layer": 3, "level": 4, "y": 4, "x": 3}
-TIMES = np.array(["2007-10-23T18:00:00"], "datetime64[ns]")
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """A small file of every format."""
     folder = tmp_path_factory.mktemp("files")
-    demo = write_demo(folder, size=8)
-    found = {"wrf": demo.wrf, "mcd43": demo.albedo, "plume": demo.plume}
-    found["prior"] = folder / "prior.toml"
-    found["prior"].write_text(PRIOR)
-    found["result"] = folder / "result.nc"
-    write_result(found["result"])
-    return found
-
-
-def write_result(path):
-    rng = np.random.default_rng(7)
-
-    def values(*dims):
-        return dims, rng.uniform(size=[SIZES[dim] for dim in dims])
-
-    position = {name: values("y", "x") for name in ("latitude", "longitude")}
-    fields = {name: values(*v.dims) for name, v in SCENARIO.items() if name not in position}
-    fields["quality_flag"] = ("y", "x"), rng.integers(0, 32, (4, 3))
-    fields |= {name: values("band", "y", "x") for name in ("reflectance_factor", "brf")}
-    scene = xr.Dataset(fields, {"band": ["C01", "C02"], "time": TIMES[0], **position})
-    attributes = {"bands": "C01 C02"}
-    with ResultWriter(path, times=TIMES, shape=(4, 3), attributes=attributes) as writer:
-        writer.write(0, slice(0, 4), scene)
+    return write_originals(folder)
 
 
 def verdicts(kind, file, first, count):
@@ -68,7 +53,9 @@ def verdicts(kind, file, first, count):
             str(first),
             str(end - first),
         ]
-        path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+        path = os.pathsep.join(
+            [str(ROOT), str(HOSTILE.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+        )
         environment = os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
         run = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=500)
         for line in run.stdout.splitlines():
@@ -132,3 +119,150 @@ def test_what_cannot_be_read_later_is_told(files, tmp_path):
     with pytest.raises(RuntimeError, match="another"):
         with reading("a file"):
             raise RuntimeError("another")
+
+
+def test_every_format_has_its_damaged_copies(files):
+    assert set(files) == set(READERS) == set(FORMATS)
+    assert NETCDF == tuple(kind for kind in READERS if files[kind].read_bytes()[:4] == b"\x89HDF")
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_originals_are_read(kind, files):
+    assert not [read.nonsense for read in READERS[kind](files[kind]) if read.nonsense]
+
+
+def test_names_in_a_result_lead_nowhere_else(files, tmp_path):
+    """A run replaces the pictures that the result before it names: those of its own folder."""
+    folder = tmp_path / "out"
+    (folder / "sub").mkdir(parents=True)
+    for place in (tmp_path / "a.png", folder / "sub" / "b.png", folder / "c.png"):
+        place.touch()
+    names = ["../a.png", str(tmp_path / "a.png"), "sub/b.png", "./c.png", "..", "", "c.png"]
+    (folder / "result.nc").write_bytes(files["result"].read_bytes())
+    note_files(folder / "result.nc", names)
+    assert noted_files(folder / "result.nc") == ["c.png"]
+
+
+def test_parts_that_are_not_as_they_were_kept_are_computed_again(tmp_path):
+    parts, kept = Parts(tmp_path), {"brf": np.ones(3), "flag": np.arange(3)}
+    parts.keep("one", kept)
+    (path,) = tmp_path.rglob("*.npz")
+    assert parts.find("one").keys() == kept.keys()
+    whole = path.read_bytes()
+    for place in range(8, len(whole)):
+        if whole[place : place + 4] == b"PK\1\2":
+            break
+    # A method of compression that there is none of, and one that is not installed everywhere.
+    for method in (b"\x63\0", b"\x0c\0"):
+        path.write_bytes(whole[: place + 10] + method + whole[place + 12 :])
+        assert parts.find("one") is None
+    np.savez(path, brf=kept["brf"], names_of_arrays=["brf", "flag"])  # an array is gone
+    assert parts.find("one") is None
+    with path.open("wb") as file:  # code would run
+        np.savez(file, brf=np.array([Ran()], object), names_of_arrays=["brf"])
+    assert parts.find("one") is None and not Ran.ran
+
+
+class Ran:
+    """What runs code of its choice when it is unpickled."""
+
+    ran = False
+
+    def __reduce__(self):
+        return setattr, (Ran, "ran", True)
+
+
+def test_an_image_that_cannot_be_read_is_told(files, tmp_path):
+    data = bytearray(files["result"].read_bytes())
+    for start in range(len(data) // 4, len(data), 97):
+        data[start] ^= 255
+    path = tmp_path / "result.nc"
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="result.nc cannot be read"):
+        read_image(path, 0)
+
+
+def infinite(file):
+    file["jacobian"][0, 0, 0] = np.inf
+
+
+def listed(file):
+    file.settings = "[1]"
+
+
+def nested(file):
+    file.requested_bands = 100_000 * "["
+
+
+def packed(file):
+    file["value"].add_offset = "one"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (infinite, "jacobian in .* is infinite"),  # within its own tolerance of any number
+        (listed, "settings that are no names"),
+        (nested, "is no baseline"),
+        (packed, "add_offset of value in .* is no number"),
+        (lambda file: file.renameDimension("input", "other"), "along"),
+    ],
+)
+def test_baselines_that_cannot_be_compared_are_refused(change, words, files, tmp_path):
+    path = changed(files["baseline"], tmp_path / "baseline.nc", change)
+    with pytest.raises(InputError, match=words):
+        read_baseline(path)
+
+
+def too_deep(file):
+    file["aod_550"][0] = 1e30
+
+
+def no_error(file):
+    file["aod_550_sigma"][0] = np.nan
+
+
+def other_bands(file):
+    file.bands = "C01 C05"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (too_deep, r"aod_550 in .* is 1e\+30 at .* pixels whose result_code is success"),
+        (no_error, "aod_550_sigma in .* is nan"),
+        (other_bands, "does not tell of its bands"),
+        (lambda file: file.delncattr("bands"), "does not tell of its bands"),
+        (lambda file: file.setncattr("kind", "fog"), "retrieval of 'fog', which is none"),
+        (lambda file: file.setncattr("aod_limit", "none"), "aod_limit in .* is no limit"),
+    ],
+)
+def test_retrievals_that_cannot_be_scored_are_refused(change, words, files, tmp_path):
+    path = changed(files["retrieval"], tmp_path / "retrieval.nc", change)
+    with pytest.raises(InputError, match=words):
+        read_retrieval(path)
+
+
+def test_a_retrieval_with_half_of_its_intervals_is_refused(files, tmp_path):
+    with read_retrieval(files["retrieval"]) as whole:
+        whole.drop_vars("aod_550_upper_95").to_netcdf(tmp_path / "retrieval.nc")
+    with pytest.raises(InputError, match="has no aod_550_upper_95"):
+        read_retrieval(tmp_path / "retrieval.nc")
+
+
+def darker_than_dark(file):
+    file["CMI"][5, 5] = -1e30
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "words"),
+    [
+        ("imagery", darker_than_dark, "less than noise leaves of the dark"),
+        ("imagery", lambda file: file["band_id"].__setitem__(0, -2), "band_id in .* above 0"),
+        ("radiance", lambda file: file["esun"].__setitem__(..., np.nan), "esun in .* is .nan."),
+    ],
+)
+def test_observations_that_are_none_are_refused(kind, change, words, files):
+    path = changed(files[kind], files[kind].with_name("observed-otherwise.nc"), change)
+    with pytest.raises(InputError, match=words):
+        list(READERS[kind](path))
