@@ -129,7 +129,8 @@ class Observation(eqx.Module):
 
 
 def _censored(departure: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
-    near = departure < _ENOUGH  # beyond, the square root of next to nothing has no slope
+    # Beyond, the square root of next to nothing has no slope; what is NaN is not beyond, but NaN.
+    near = ~(departure >= _ENOUGH)
     likelihood = jax.scipy.special.log_ndtr(jnp.where(near, departure, _ENOUGH))
     # Its sign is that of a departure from below, so that a step knows which way to go.
     return -jnp.sqrt(-2 * likelihood)

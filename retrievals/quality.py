@@ -18,19 +18,26 @@ RIVAL_COST = 4.0
 
 _SAME_X = 1e-3  # minima that are closer than this, or than their errors, are one
 
+# Where measurements do not determine x, its variance is infinite, or by rounding below 0: errors
+# are NaN then, and minima at infinity are NaN apart. Both have codes, and need no warning.
+_no_warning = np.errstate(invalid="ignore")
 
+
+@_no_warning
 def sigmas(vector: StateVector, inversion: Inversion) -> np.ndarray:
-    """Posterior standard deviation of each quantity, in its unit."""
+    """Posterior standard deviation of each quantity, in its unit; NaN where there is none."""
     variance = np.diagonal(inversion.covariance, axis1=-2, axis2=-1)
     return np.asarray(vector.slopes(inversion.x)) * np.sqrt(variance)
 
 
+@_no_warning
 def same_solution(one: Inversion, two: Inversion) -> np.ndarray:
     """Whether two solutions of each pixel are one, to what a minimisation leaves."""
     apart = np.abs(np.asarray(one.x) - np.asarray(two.x))
     return np.asarray(~(apart > _SAME_X).any(axis=-1))
 
 
+@_no_warning
 def result_codes(
     vector: StateVector,
     best: Inversion,
