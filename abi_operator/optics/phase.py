@@ -71,9 +71,13 @@ def _henyey_greenstein(g: Array, cos_scattering: Array) -> Array:
 
 
 def _lobe(g: Array, cos_scattering: Array) -> Array:
-    # 1 + g^2 - 2 g cos, written so that float32 keeps its digits in a strong forward peak.
-    distance = (1 - g) ** 2 + 2 * g * (1 - cos_scattering)
-    return (1 - g) * (1 + g) / (distance * jnp.sqrt(distance))
+    # A peak straight back is one straight ahead with both signs changed.
+    back = g < 0
+    share, along = choose(back, -g, g), choose(back, -cos_scattering, cos_scattering)
+    # 1 + g^2 - 2 g cos, written so that float32 keeps its digits in a strong peak; and divided by
+    # in two steps, as a slope has the square of what is divided by.
+    distance = (1 - share) ** 2 + 2 * share * (1 - along)
+    return (1 - g) * (1 + g) / distance / jnp.sqrt(distance)
 
 
 @final

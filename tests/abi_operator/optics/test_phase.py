@@ -51,10 +51,26 @@ def test_derivative_of_moments_is_exact_at_zero_asymmetry(mode):
 
 @pytest.mark.float32
 @pytest.mark.parametrize("cos_scattering", [-1.0, 0.2, 1.0])
-def test_float32_keeps_its_digits_in_the_forward_peak(cos_scattering):
-    g = 0.9
+@pytest.mark.parametrize("g", [0.9, -0.9])
+def test_float32_keeps_its_digits_in_a_peak(g, cos_scattering):
     exact = (1 - g**2) / (1 + g**2 - 2 * g * cos_scattering) ** 1.5
     value = HenyeyGreenstein(jnp.float32(g))(jnp.float32(cos_scattering))
     assert value.dtype == jnp.float32
-    # Rounding of g itself is amplified by 3 g / (1 - g) = 27 straight ahead.
+    # Rounding of g itself is amplified by 3 g / (1 - g) = 27 straight into the peak.
     np.testing.assert_allclose(value, exact, rtol=3e-6)
+
+
+@pytest.mark.float32
+def test_the_sharpest_peak_has_its_height_and_finite_slopes():
+    """Straight into it, (1 + g) / (1 - g)^2, and 2 / (1 - g)^2 of the last g below 1."""
+    to_either_side = jnp.asarray([1.0, -1.0], jnp.float32)
+    for distance in (1e-2, 1e-4, float(np.finfo(np.float32).epsneg)):
+        g = np.float32(1 - distance)
+        height, slopes = jax.vmap(
+            jax.value_and_grad(lambda g, c: HenyeyGreenstein(g)(c)[0], argnums=(0, 1))
+        )(to_either_side * g, to_either_side)
+        exact = (1 + float(g)) / (1 - float(g)) ** 2
+        np.testing.assert_allclose(height, [exact, exact], rtol=1e-6)
+        slope = (3 + float(g)) / (1 - float(g)) ** 3
+        np.testing.assert_allclose(slopes[0], [slope, -slope], rtol=1e-6)
+        assert np.isfinite(slopes[1]).all()
