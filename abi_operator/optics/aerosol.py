@@ -85,7 +85,8 @@ def background(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
        \frac{e^{-z_{k+1} / H} - e^{-z_k / H}}{1 - e^{-z_0 / H}}
 
     with the heights z of the levels above the ground, the first one being the top, and the scale
-    height H; its phase function is that of Henyey and Greenstein.
+    height H; its phase function is that of Henyey and Greenstein. Levels that are all at one height
+    hold none.
 
     Parameters
     ----------
@@ -105,7 +106,9 @@ def background(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     relative, ssa, asymmetry = _specified(properties, "background", band)
     above_ground = atmosphere.height - atmosphere.height[-1]
     beneath = -jnp.expm1(-above_ground / properties.scale_height)
-    extinction = relative * properties.aod_550 * -jnp.diff(beneath) / beneath[0]
+    thick = beneath[0] > 0
+    shares = jnp.where(thick, -jnp.diff(beneath) / jnp.where(thick, beneath[0], 1), 0)
+    extinction = relative * properties.aod_550 * shares
     scatterer = Scatterer(ssa * extinction, HenyeyGreenstein(asymmetry))
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._numerics import safe_divide
 from ...atmosphere import Atmosphere, Gases
 from ...constants import STANDARD_PRESSURE
 from ..pointwise import choose, pointwise
@@ -43,8 +44,7 @@ def self_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
     layer of no air has none.
     """
     air, vapour = jnp.diff(atmosphere.pressure), gases_of(atmosphere).vapour
-    filled = air > 0
-    humidity = jnp.where(filled, _GRAVITY * vapour / jnp.where(filled, air, 1.0), 0.0)
+    humidity = safe_divide(_GRAVITY * vapour, air)
     own = humidity * _middle(atmosphere.pressure) / (0.622 + 0.378 * humidity)
     return vapour * (own / STANDARD_PRESSURE) * (296 / _middle(temperature_of(atmosphere))) ** 7
 

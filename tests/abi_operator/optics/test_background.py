@@ -32,6 +32,18 @@ def test_it_thins_upwards_by_its_scale_height_above_the_ground():
     np.testing.assert_allclose(tau[:-1] / tau[1:], np.exp(-0.5), rtol=1e-12)
 
 
+def test_levels_at_one_height_hold_none():
+    """Nor has that slopes that are no numbers, as 0 / 0 has."""
+
+    def in_layers(height):
+        some = replace(air(levels=(300.0, 300.0, 300.0)), height=height)
+        return background(some, BANDS["C01"]).tau[0]
+
+    flat = jnp.full(3, 300.0)
+    np.testing.assert_array_equal(in_layers(flat), 0)
+    assert np.isfinite(jax.jacrev(in_layers)(flat)).all()
+
+
 def test_its_derivatives_are_finite_and_those_of_the_formula():
     @jax.jit
     def in_layers(aod, scale_height):

@@ -8,7 +8,7 @@ import pytest
 
 from abi_operator.bands import BANDS, Band
 from abi_operator.optics.gas import ALL_GASES, gas_absorption, transmittance
-from abi_operator.optics.gas.amounts import WarmVapour, gases_of
+from abi_operator.optics.gas.amounts import WarmVapour, gases_of, self_continuum_vapour
 from abi_operator.optics.gas.tables import TABLES
 from abi_operator.standard_atmospheres import standard_atmosphere
 
@@ -369,3 +369,15 @@ def test_float32_stays(band):
     optics = gas_absorption(atmosphere, BANDS[band])
     assert optics.extinction.dtype == optics.weight.dtype == jnp.float32
     assert transmittance(optics, jnp.asarray(2.0, jnp.float32)).dtype == jnp.float32
+
+
+def test_a_layer_of_next_to_no_air_has_finite_slopes():
+    """Of a difference of pressure whose square is no number of the type."""
+    for dtype, sliver in ((np.float64, 1e-200), (np.float32, 1e-25)):
+        air = standard_atmosphere("us_standard", np.array([0.0, 1e3, 2e3])[::-1])
+        air = jax.tree.map(lambda x, dtype=dtype: jnp.asarray(x, dtype), air)
+        pressure = jnp.asarray([0.0, sliver, 1e5], dtype)
+        slopes = jax.jacrev(
+            lambda p, air=air: self_continuum_vapour(eqx.tree_at(lambda a: a.pressure, air, p))
+        )(pressure)
+        assert np.isfinite(slopes).all()
