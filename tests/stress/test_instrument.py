@@ -9,6 +9,7 @@ import pytest
 from drawn import REPEATABLE, all_finite, among, array, powers
 from hypothesis import given
 
+from abi_operator.bands import BANDS
 from abi_operator.instrument import (
     Imager,
     footprint_mean,
@@ -22,6 +23,9 @@ from abi_operator.instrument import (
 COUNT = 16
 RADIANCE = array(powers(-12, 5, 1e-300, 16.9, 411.0), COUNT)
 WIDTH = among(0.01, 1.0, 0.1)
+# Green is a band that the instrument lacks.
+MEASURED = [band for band in BANDS if band != "green"]
+SATELLITES = "GOES-16", "GOES-17", "GOES-18", "GOES-19"
 
 
 # One program each, and not one for every operation.
@@ -40,7 +44,7 @@ def reported(radiance, band):
     return jnp.sum(jnp.stack(rows)), rows
 
 
-@pytest.mark.parametrize("band", ["C02", "C07"])
+@pytest.mark.parametrize("band", MEASURED)
 @given(RADIANCE)
 @REPEATABLE
 def test_counts_are_kept_by_packing_them_again(band, radiance):
@@ -61,7 +65,7 @@ def test_a_smooth_ceiling_rises_and_stays_below(radiance, width):
     assert ((slope >= 0) & (slope <= 1 + 1e-12)).all()
 
 
-@pytest.mark.parametrize("band", ["C02", "C07"])
+@pytest.mark.parametrize("band", MEASURED)
 @given(RADIANCE)
 @REPEATABLE
 def test_what_is_reported_is_finite(band, radiance):
@@ -80,3 +84,15 @@ def test_a_footprint_sees_no_more_than_its_cells(radiance, weights):
         assert seen.min() * (1 - 1e-12) <= mean <= seen.max() * (1 + 1e-12)
     else:
         assert np.isnan(mean)
+
+
+def test_every_band_of_every_satellite_saturates_at_its_ceiling():
+    """Counts go no higher than what is saturated, which is told."""
+    for satellite in SATELLITES:
+        imager = Imager(satellite, quantised=True)
+        for band in MEASURED:
+            top = float(range_ceiling(band, satellite))
+            seen = observe_mean(jnp.array([0.0, 0.5, 1.0, 2.0, 1e6]) * top, band, imager)
+            assert np.asarray(seen.saturated).tolist() == [False, False, True, True, True]
+            assert (np.asarray(seen.radiance) <= top * (1 + 1e-6)).all()
+            assert all_finite([seen.radiance])

@@ -8,7 +8,7 @@ from drawn import REPEATABLE, all_finite, among, array
 from hypothesis import given
 
 from abi_operator.solver import Lambertian
-from abi_operator.surface import RossLi, ocean
+from abi_operator.surface import LandAndSea, RossLi, brightened, ocean
 
 COUNT = 16
 COSINES = array(among(1e-6, 1.0, 1e-3, np.nextafter(1.0, 0.0), 0.5), COUNT)
@@ -22,6 +22,18 @@ def grounds(share, wind):
         "Lambertian": Lambertian(share),
         "Ross-Li": RossLi(share, 0.5 * share, 0.2 * share),
         "ocean": ocean(wind, "C02"),
+    }
+
+
+def mixed_grounds(share, wind, volume, geometric):
+    """Grounds of two parts, with kernel weights of any sign, and grounds that were brightened."""
+    coast = LandAndSea(RossLi(share, volume, geometric), ocean(wind, "C07"), share)
+    return {
+        "land": coast.land,
+        "sea": coast.sea,
+        "land and sea": coast,
+        "brighter": brightened(coast, 0.3 * share),
+        "darker": brightened(Lambertian(share), -0.3 * share),
     }
 
 
@@ -56,3 +68,49 @@ def test_reflectance_is_finite_and_reciprocal(name, dtype, share, wind, mu_out, 
     if name == "ocean":
         foam = 2.95e-6 * wind**3.52
         assert (np.asarray(found)[foam <= 1] >= 0).all()
+
+
+MIXED = "land", "sea", "land and sea", "brighter", "darker"
+WEIGHTS = array(among(-1.0, 1.0, 0.0, 1e-12), COUNT)
+ORDERS = 0, 1, 7
+
+
+def judged_modes(name, fields, angles):
+    """Reflectance and its modes there and back, and slopes of all of them in everything."""
+
+    def of(fields, mu_out, mu_in, azimuth):
+        ground = mixed_grounds(*fields)[name]
+        there, back = jnp.stack([mu_out, mu_in]), jnp.stack([mu_in, mu_out])
+        modes = jax.vmap(lambda m: ground.modes(m, there, back))(jnp.asarray(ORDERS))
+        modes = jnp.broadcast_to(modes, (len(ORDERS), *there.shape))
+        plain = jnp.broadcast_to(ground.brdf(there, back, azimuth), there.shape)
+        return jnp.concatenate([plain[None], modes])
+
+    found, pull = jax.vjp(of, fields, *angles)
+    return found, pull(jnp.ones_like(found))
+
+
+judge_modes = jax.jit(judged_modes, static_argnums=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("name", MIXED)
+def test_modes_are_finite_and_reciprocal(name, dtype):
+    @given(SHARES, WINDS, WEIGHTS, WEIGHTS, COSINES, COSINES, AZIMUTHS)
+    @REPEATABLE
+    def of(share, wind, volume, geometric, mu_out, mu_in, azimuth):
+        fields = tuple(x.astype(dtype) for x in (share, wind, volume, geometric))
+        angles = tuple(x.astype(dtype) for x in (mu_out, mu_in, azimuth))
+        found, slopes = judge_modes(name, fields, angles)
+        found = np.asarray(found)
+        assert all_finite([found, *jax.tree.leaves(slopes)])
+        found, back = found[:, 0], found[:, 1]
+        # Kernels and glints of both parts may cancel.
+        rounding = 100 * np.finfo(dtype).eps * np.maximum(1, np.abs(found))
+        assert (np.abs(found - back) <= rounding).all()
+        if name == "sea":
+            # The mean over azimuths of what is below 0 nowhere.
+            assert (found[:2, 2.95e-6 * wind**3.52 <= 1] >= 0).all()
+
+    of()
