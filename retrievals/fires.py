@@ -33,7 +33,7 @@ from abi_operator.instrument import Imager, reflectance_factor_from_radiance
 from abi_operator.machine.speed import Kept
 from abi_operator.nomenclature import QUALITY_FLAGS, SCENARIO
 from abi_operator.radiance import FIRE_BANDS
-from abi_operator.scene import column_states
+from abi_operator.scene import states_of_result
 from abi_operator.settings import streams_of_attributes
 
 from .chunks import map_chunks
@@ -275,7 +275,7 @@ def _gathered(
     """Measurements and states of the pixels of one image that are attempted."""
     y, x = np.nonzero(chosen)
     columns = image.isel(y=xr.DataArray(y, dims="column"), x=xr.DataArray(x, dims="column"))
-    states = with_fire(column_states(columns, forward.bands), 0.0)
+    states = with_fire(states_of_result(columns, forward.bands), 0.0)
     distance = np.full(len(y), distance_of(image))
     observed = measurement(
         measured[:, y, x].T,

@@ -13,7 +13,7 @@ from abi_operator.bands import check_bands
 from abi_operator.files import InputError
 from abi_operator.instrument import IMAGER
 from abi_operator.nomenclature import PLUME, SCENARIO
-from abi_operator.scene import column_states, gases_of
+from abi_operator.scene import gases_of, states_of_result
 from abi_operator.settings import streams_of_attributes
 
 from .forward import ForwardModel, prepared
@@ -285,6 +285,6 @@ def _gather(
             columns = image.isel(y=y, x=x)
             # Where something burns the bands that it shines in are missing; elsewhere a scene's
             # reflectances are those of sunlight alone.
-            states = replace(column_states(columns, bands), fire=None)
+            states = replace(states_of_result(columns, bands), fire=None)
             parts.append((observe(columns, bands), states))
     return jax.tree.map(lambda *arrays: np.concatenate(arrays), *parts)

@@ -1,9 +1,10 @@
 """Scenes: from a weather model's output to a scenario, its columns, and their simulated image.
 
 `scenario` specifies one time of a scene: it completes the columns of a model Dataset to the top of
-the atmosphere and adds ground, sun, satellite and plumes. `column_states` makes of it, or of a
-result that is read back, the states that the operator takes. `simulate` adds radiances and
-reflectances, and `run` does so for scenes that do not fit into memory. No file is opened here.
+the atmosphere and adds ground, sun, satellite and plumes. `column_states` makes of it, and
+`states_of_result` of a result that is read back, the states that the operator takes. `simulate`
+adds radiances and reflectances, and `run` does so for scenes that do not fit into memory. No file
+is opened here.
 """
 
 from .account import add_accounts as add_accounts
@@ -18,6 +19,7 @@ from .cloud_optics import ice_optics_of as ice_optics_of
 from .column_air import completion_heights as completion_heights
 from .column_air import highest_top as highest_top
 from .columns import column_states as column_states
+from .columns import states_of_result as states_of_result
 from .condensate import CLASSES as CLASSES
 from .condensate import check_classes as check_classes
 from .condensate import classes_present as classes_present

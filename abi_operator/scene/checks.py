@@ -44,7 +44,7 @@ def check_scenario(scenario: xr.Dataset, first_row: int = 0) -> None:
     Parameters
     ----------
     scenario
-        A scenario with dimensions y and x.
+        A scenario with dimensions y and x, or ``column`` in their place.
     first_row
         Row of the scene at which this block of it begins; the message counts from there. [-]
     """
@@ -53,7 +53,8 @@ def check_scenario(scenario: xr.Dataset, first_row: int = 0) -> None:
             continue
         first = tuple(np.argwhere(~holds)[0].tolist())
         value = np.broadcast_to(scenario[name].values, holds.shape)[first]
-        dims = scenario[name].dims if scenario[name].ndim == holds.ndim else ("y", "x")
+        whole = scenario[name].ndim == holds.ndim
+        dims = scenario[name].dims if whole else scenario["latitude"].dims
         place = dict(zip(dims, first, strict=True))
         if "y" in place:
             place["y"] += first_row

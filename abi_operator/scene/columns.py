@@ -24,6 +24,7 @@ from ..nomenclature import GROUND, PLUME
 from ..radiance import THERMAL
 from ..settings import streams_of_attributes
 from .background import BY_BAND, QUANTITIES
+from .checks import check_scenario
 from .cloud_optics import cloud_optics_of, ice_optics_of
 from .grounds import land_and_sea
 from .species import classes_of, species_of
@@ -105,6 +106,20 @@ def column_states(
         surface_temperature=reader.optional("surface_temperature"),
         fire=_fire(reader) if "fire_fraction" in scenario else None,
     )
+
+
+def states_of_result(
+    result: xr.Dataset, bands: Sequence[str] = GRASSO2013, *, num_streams: int | None = None
+) -> State:
+    """The same of a result that was read back, whose numbers may be another program's.
+
+    Raises
+    ------
+    InputError
+        Where a number of a column is outside its range (`check_scenario`).
+    """
+    check_scenario(result)
+    return column_states(result, bands, num_streams=num_streams)
 
 
 def horizontal(dataset: xr.Dataset) -> dict[str, int]:

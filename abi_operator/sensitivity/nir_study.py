@@ -17,7 +17,7 @@ import xarray as xr
 from ..atmosphere import State
 from ..files import InputError
 from ..files.result import CONVENTIONS
-from ..scene import column_states, gases_of, species_of
+from ..scene import gases_of, species_of, states_of_result
 from ..settings import Settings, streams_of_attributes
 from .green_change import NearInfrared, green_fields
 from .pixel_kinds import CLOUD, cloud_depth, depths_of
@@ -147,7 +147,7 @@ def brf_by_band(image: xr.Dataset) -> dict[str, np.ndarray]:
 
 def _columns(image: xr.Dataset, chosen: np.ndarray) -> State:
     y, x = (xr.DataArray(index, dims="column") for index in np.nonzero(chosen))
-    return column_states(image.isel(y=y, x=x), (BAND,))
+    return states_of_result(image.isel(y=y, x=x), (BAND,))
 
 
 def _check(image: xr.Dataset, species: str) -> None:

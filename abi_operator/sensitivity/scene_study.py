@@ -11,7 +11,7 @@ import xarray as xr
 from ..atmosphere import Fire, State
 from ..files import InputError
 from ..plume_edges import moves_plume_edges
-from ..scene import column_states, gases_of, species_of
+from ..scene import gases_of, species_of, states_of_result
 from ..scene.angles import sun_distance
 from ..settings import Settings, streams_of_attributes
 from .declarations import declared
@@ -178,7 +178,7 @@ def chosen_pixels(image: xr.Dataset, species: str | None, where: str) -> np.ndar
 def states_of(image: xr.Dataset, chosen: np.ndarray, of: Sequence[str], fire: Fire) -> State:
     """Columns of pixels (y, x), with a fire and temperatures where its contrast is looked at."""
     y, x = (xr.DataArray(index, dims="column") for index in np.nonzero(chosen))
-    states = column_states(image.isel(y=y, x=x), bands_of(of))
+    states = states_of_result(image.isel(y=y, x=x), bands_of(of))
     if FIRE_CONTRAST not in of:
         return states
     count = int(chosen.sum())

@@ -9,7 +9,7 @@ import xarray as xr
 from abi_operator import State
 from abi_operator.instrument import Imager
 from abi_operator.radiance import FIRE_BANDS
-from abi_operator.scene import column_states
+from abi_operator.scene import states_of_result
 
 from ..observation import noise_sigma
 
@@ -49,7 +49,7 @@ class PlumePixels:
         for start in range(0, len(self.y), BLOCK):
             rows = slice(start, min(start + BLOCK, len(self.y)))
             y, x = (xr.DataArray(index[rows], dims="column") for index in (self.y, self.x))
-            states = column_states(self.image.isel(y=y, x=x), self.bands)
+            states = states_of_result(self.image.isel(y=y, x=x), self.bands)
             yield rows, replace(states, fire=None)
 
     def thinned(self, count: int) -> "PlumePixels":

@@ -10,7 +10,7 @@ import xarray as xr
 
 from abi_operator.files import InputError
 from abi_operator.nomenclature import PLUME, SCENARIO
-from abi_operator.scene import column_states, species_of
+from abi_operator.scene import species_of, states_of_result
 
 from ..images import forward_model
 from ..observation import UNUSABLE, imager_of
@@ -161,7 +161,7 @@ def numbers_of(
     first = image.isel(y=slice(0, 1), x=slice(0, 1))
     try:
         with jax.enable_x64(True):
-            states = column_states(first, [str(band) for band in image["band"].values])
+            states = states_of_result(first, [str(band) for band in image["band"].values])
             plume = jax.tree.map(lambda leaf: leaf[0], states.atmosphere.plumes[name])
             return plume_numbers(numbers, name, plume)
     except ValueError as error:
