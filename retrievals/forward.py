@@ -139,7 +139,9 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
         moves the base or the top of a plume.
     """
     chunk = chunk_of_pixels_to_read()
-    max_tau = np.max(map_chunks(partial(_largest_tau, forward), states, chunk=chunk))
+    tau = map_chunks(partial(_largest_tau, forward), states, chunk=chunk)
+    # A column that is no number is none with any doublings, and asks for none of the others'.
+    max_tau = np.max(np.where(np.isfinite(tau), tau, 0))
     cosines = (np.cos(x) for x in (states.geometry.solar_zenith, states.geometry.view_zenith))
     min_mu = min(np.min(np.where(x > 0, x, 1.0)) for x in cosines)  # below the horizon: none
     known = float(max_tau), float(min_mu), forward.num_streams, max_tau.dtype

@@ -75,6 +75,7 @@ def retrieve_pixels(
     first_steps = _coarse(forward, minimiser, prior)
     starts, guess, several = _starts(forward, first_steps, minimiser, inputs)
     attempted = codes == ResultCode.SUCCESS
+    bounded = np.asarray(observations.present).sum(axis=-1) > observations.num_values
     if prior is None:  # as many unknowns as measurements: several solutions may fit exactly
         determined = observations.num_values <= forward.vector.size
     else:
@@ -92,7 +93,8 @@ def retrieve_pixels(
         return jax.tree.map(lambda x: x[np.argsort(order)], solutions)
 
     def judged(best: Inversion, other: Inversion) -> np.ndarray:
-        return result_codes(forward.vector, best, other, observations.num_values, exact=exact)
+        values = observations.num_values
+        return result_codes(forward.vector, best, other, values, exact=exact, bounded=bounded)
 
     best = begin(np.arange(len(codes)), guess[:, 0])
     other = best
@@ -104,8 +106,8 @@ def retrieve_pixels(
             best, other = _ranked(best, other, found, rows)
     final = np.where(attempted, judged(best, other), codes).astype(np.int8)
     # Of bounds, and nothing else, nothing is known on the other side but the prior.
-    bounded = (observations.num_values == 0) & (final == ResultCode.SUCCESS)
-    final[bounded] = ResultCode.NOT_OBSERVABLE
+    alone = (observations.num_values == 0) & (final == ResultCode.SUCCESS)
+    final[alone] = ResultCode.NOT_OBSERVABLE
     return Retrieved(best, final, other)
 
 

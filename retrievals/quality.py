@@ -45,6 +45,7 @@ def result_codes(
     num_values: np.ndarray,
     *,
     exact: bool,
+    bounded: bool | np.ndarray = False,
 ) -> np.ndarray:
     """Judge the solutions of all pixels.
 
@@ -59,15 +60,17 @@ def result_codes(
         Number of measurements of each pixel.
     exact
         Whether the measurements are free of noise, and no prior pulls the solution away from them.
+    bounded
+        Which pixels have saturated bands: the likelihood of a bound is 1 far above the ceiling
+        alone, so that no fit of theirs has to be exact.
     """
     alone = np.all(best.prior_cost == 0)
     freedom = np.broadcast_to(num_values - (vector.size if alone else 0), best.cost.shape)
     probability = probability_of_cost(best.cost, np.maximum(freedom, 1))
     # A prior pulls away from bounds, too, where all bands are saturated: no fit has to be exact.
     determined = (freedom <= 0) & alone
-    explained = np.where(
-        determined | exact, best.cost <= EXACT_COST, probability >= SMALLEST_PROBABILITY
-    )
+    to_be_met = (determined | exact) & ~np.asarray(bounded)
+    explained = np.where(to_be_met, best.cost <= EXACT_COST, probability >= SMALLEST_PROBABILITY)
     apart = np.abs(np.asarray(rival.x) - np.asarray(best.x))
     if exact:
         rivalled = (rival.cost <= EXACT_COST) & (apart > _SAME_X).any(axis=-1)

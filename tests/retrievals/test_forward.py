@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import numpy as np
 
 from abi_operator import reflectance_factor
@@ -89,3 +90,12 @@ def test_prepared_doublings_suffice_at_the_limit(columns, forward):
     x = forward.vector.x(np.full(len(truth), 9.999))
     many = replace(forward, num_doublings=13)
     np.testing.assert_allclose(forward(x, states), many(x, states), rtol=ROUNDING)
+
+
+def test_a_column_that_is_no_number_asks_for_no_doublings(columns, forward):
+    """All columns would have as many as the solver offers, for one of which nothing comes."""
+    _, states, _ = columns
+    pressure = np.array(states.atmosphere.pressure)
+    pressure[3] = np.nan
+    holed = eqx.tree_at(lambda s: s.atmosphere.pressure, states, pressure)
+    assert prepared(forward, holed).num_doublings == prepared(forward, states).num_doublings

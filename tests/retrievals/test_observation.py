@@ -171,6 +171,13 @@ def test_a_saturated_band_is_a_lower_bound():
     np.testing.assert_allclose((2 * residual * slope)[near], -2 * hazard[near], rtol=1e-9)
 
 
+def test_what_is_no_number_exceeds_no_bound():
+    """A state that is none would end as a success, explained by all of its saturated bands."""
+    observation = Observation(np.full(2, 1.2), np.full(2, 0.01), np.ones(2, bool))
+    residual = residual_of(observation, np.array([np.nan, 9.0]))
+    assert np.isnan(residual[0]) and residual[1] ** 2 < 1e-8
+
+
 def test_pixels_are_refused_for_a_reason(make_scenario):
     made = make_scenario()
     image = made.assign(reflectance_factor=0 * made["surface_albedo"] + 0.2)

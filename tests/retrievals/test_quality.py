@@ -78,6 +78,15 @@ def test_without_spare_measurements_only_an_exact_fit_will_do():
     assert code(inversion(), exact=False, num_bands=1) == ResultCode.SUCCESS
 
 
+def test_bounds_are_met_in_their_measure():
+    """At the ceiling itself the likelihood of a bound costs 2 ln 2, though nothing is wrong."""
+    alone = {"num_values": np.array([1]), "bounded": np.array([True])}
+    for exact in (False, True):
+        for cost, expected in ((2 * np.log(2), ResultCode.SUCCESS), (11.0, ResultCode.POOR_FIT)):
+            best = inversion(cost=cost)
+            assert result_codes(VECTOR, best, best, exact=exact, **alone)[0] == expected
+
+
 def test_every_code_has_a_message_and_a_flag():
     assert all(code.message.endswith(".") for code in ResultCode)
     attributes = flag_attributes()
