@@ -7,7 +7,7 @@ import xarray as xr
 
 from abi_operator import smoke
 from abi_operator.files import InputError
-from abi_operator.scene import PlumeSpecification, column_states, scenario
+from abi_operator.scene import PlumeSpecification, column_states, scenario, states_of_result
 
 BRIGHTNESS = np.linspace(0, 1, 6).reshape(3, 2)
 
@@ -92,3 +92,24 @@ def test_plumes_may_differ_from_column_to_column(made):
 def test_unknown_bands_are_refused(made):
     with pytest.raises(ValueError, match="'C04'"):
         column_states(made, ("C04",))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("relative_azimuth_angle", 1e30, "-360 to 360 degrees"),
+        ("solar_zenith_angle", np.nan, "0 to 180 degrees"),
+        ("smoke_ssa", 1.5, "0 to 1"),
+        ("liquid_mass_path", -1.0, "0 to 10000 kg m-2"),
+        ("smoke_top", 1e9, "within the column"),
+    ],
+)
+def test_a_result_with_numbers_of_another_program_is_refused(made, name, value, allowed):
+    """In columns as retrievals choose them."""
+    y, x = (xr.DataArray(index, dims="column") for index in ([0, 1], [1, 1]))
+    wrong = made.assign({name: made[name].astype(float).copy()})
+    wrong[name] = xr.where(made["latitude"] == made["latitude"][1, 1], value, wrong[name])
+    wrong[name] = wrong[name].transpose(*made[name].dims, ...)
+    states_of_result(made.isel(y=y, x=x))
+    with pytest.raises(InputError, match=rf"{name} is .*; it must be {allowed}"):
+        states_of_result(wrong.isel(y=y, x=x))
