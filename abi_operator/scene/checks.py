@@ -23,10 +23,12 @@ _OF_PLUMES = (
 )
 _OF_GASES = "vapour", "ozone", "carbon_dioxide", "methane", "nitrous_oxide"
 # Those of states, in degrees.
-_ANGLES = dict.fromkeys(
-    ("solar_zenith_angle", "view_zenith_angle"), Range(0.0, 180.0, "[]", "degrees")
-)
-_ANGLES["relative_azimuth_angle"] = Range(-360.0, 360.0, "[]", "degrees")
+_ZENITH = Range(0.0, 180.0, "[]", "degrees")
+_ANGLES = {
+    "solar_zenith_angle": _ZENITH,
+    "view_zenith_angle": _ZENITH,
+    "relative_azimuth_angle": Range(-360.0, 360.0, "[]", "degrees"),
+}
 # What a scenario may have.
 _OPTIONAL = {name: WEATHER[name] for name in ("temperature", "surface_temperature")}
 _OPTIONAL |= {name: STATE[name] for name in _OF_GASES}
@@ -70,8 +72,8 @@ def check_scenario(scenario: xr.Dataset, first_row: int = 0) -> None:
 
 
 def _requirements(scenario: xr.Dataset) -> Iterator[Requirement]:
-    for name in ("solar_zenith_angle", "view_zenith_angle", "relative_azimuth_angle"):
-        yield _inside(name, scenario[name].values, _ANGLES[name])
+    for name, allowed in _ANGLES.items():
+        yield _inside(name, scenario[name].values, allowed)
     for name in ("latitude", "longitude"):
         yield _inside(name, scenario[name].values, WEATHER[name])
     pressure, height = scenario["pressure"].values, scenario["height"].values

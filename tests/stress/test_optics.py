@@ -53,7 +53,12 @@ def columns(draw, band, species):
         {
             "given": Plume(base, base + depth, some(AMOUNT), some(SHARE), *optics),
             "spheres": MiePlume(
-                base, base + depth, some(AMOUNT), some(SHARE), some(powers(-30, 30)), species
+                base,
+                base + depth,
+                some(AMOUNT),
+                some(SHARE),
+                some(powers(-30, 30)) + 1e-30,
+                species,
             ),
         },
         some(among(1.0, 1e4, 150.0, 250.0, 325.0), LAYERS + 1),
