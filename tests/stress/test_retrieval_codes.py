@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from drawn import REPEATABLE, all_finite, among, array, powers
 from hypothesis import given, settings
-from stress_retrievals import Pixels
+from stress_retrievals_pixels import Pixels
 from veil import TWO, VEIL
 
 from retrievals import Minimiser, Observation, Prior, ResultCode, retrieve_pixels
@@ -119,7 +119,7 @@ def test_what_is_not_determined_has_a_code_and_warns_of_nothing():
 @pytest.mark.slow
 def test_codes_of_the_operator():
     """Columns of smoke at 2 streams, as `test_retrievals` has them."""
-    pixels = Pixels(COUNT, streams=2)
+    pixels = Pixels("smoke", COUNT, streams=2)
 
     @given(MEASURED, SIGMA, SATURATED, PRIOR)
     @REPEATABLE
