@@ -39,7 +39,7 @@ CHECKS = {
     "the column in an enclosure of one temperature less the black body's",
     "absorption": "plane albedo outside [0, 1]",
     "reciprocity": "sun and view exchanged",
-    "jvp and vjp": "forward and reverse mode, of the sum of their terms' sizes",
+    "jvp and vjp": "forward and reverse mode, which share one gradient, of its terms' sizes",
     "slope": "reverse mode along all arguments at once and a difference quotient, of the same",
     "partial": "slope in one number of one argument, and a quotient of steps inward, of itself",
     "inside jit": "value inside jax.jit and outside",

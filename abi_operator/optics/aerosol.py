@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._numerics import safe_divide
 from ..atmosphere import Atmosphere, BackgroundAerosol, MiePlume, Plume
 from ..bands import AnyBand, entry, first_missing
 from ..optical_properties import OpticalProperties, Scatterer
@@ -106,9 +107,7 @@ def background(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     relative, ssa, asymmetry = _specified(properties, "background", band)
     above_ground = atmosphere.height - atmosphere.height[-1]
     beneath = -jnp.expm1(-above_ground / properties.scale_height)
-    thick = beneath[0] > 0
-    shares = jnp.where(thick, -jnp.diff(beneath) / jnp.where(thick, beneath[0], 1), 0)
-    extinction = relative * properties.aod_550 * shares
+    extinction = relative * properties.aod_550 * safe_divide(-jnp.diff(beneath), beneath[0])
     scatterer = Scatterer(ssa * extinction, HenyeyGreenstein(asymmetry))
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
