@@ -178,15 +178,18 @@ def over_a_longer_step(group, index, row, precision):
         return value(moved(columns, way, steps * LONGER_STEP), num_streams=streams)
 
     (_, light), slopes = both(columns, streams)
+    light = np.asarray(light, np.float64)
+    least = np.maximum(asked.floor[row], FLOOR * abs(light))
     quotients = {
         "slope": (directions, at(directions, 1) - at(directions, -1)),
-        "partial": (one, 4 * at(one, 1) - at(one, 2) - 3 * np.asarray(light)),
+        "partial": (one, 4 * at(one, 1) - at(one, 2) - 3 * light),
     }
     found = {}
     for name, (way, difference) in quotients.items():
         slope, sizes = along(slopes, way)
         apart = abs(difference / (2 * LONGER_STEP) - slope)
-        found[name] = float((apart / np.maximum(sizes, asked.floor[row]))[0])
+        of = np.maximum(sizes, asked.floor[row] if name == "slope" else least)
+        found[name] = float((apart / of)[0])
     return found
 
 

@@ -41,13 +41,14 @@ CHECKS = {
     "reciprocity": "sun and view exchanged",
     "jvp and vjp": "forward and reverse mode, which share one gradient, of its terms' sizes",
     "slope": "reverse mode along all arguments at once and a difference quotient, of the same",
-    "partial": "slope in one number of one argument, and a quotient of steps inward, of itself",
+    "partial": "slope in one number of one argument, and a quotient of steps inward, of itself "
+    f"or of {FLOOR:g} of the reflectance",
     "inside jit": "value inside jax.jit and outside",
     "slopes inside jit": "slope along one direction inside jax.jit and outside",
     "budget": f"error budget of {BUDGET:g} and none",
     "float32": "single and double precision, of the same numbers in single precision",
     "float32 slope": "slope along all arguments at once, likewise, of the sum of its terms' sizes",
-    "float32 partial": "slope in one number of one argument, likewise, of itself",
+    "float32 partial": "slope in one number of one argument, likewise, of the same",
 }
 # What passes, in double and in single precision, in which a stack's light is a difference of
 # numbers as many times as large as the layers that do not absorb are deep (`method.rounding`): 1e3
@@ -141,6 +142,14 @@ class Judged:
                 self.errors["energy"][self.beyond(np.ones_like(self.columns["ssa"]))] = np.nan
         return self.errors
 
+    def scale_of(self, size, rows=slice(None)):
+        """What errors of slopes in one number are relative to.
+
+        Where sun and view graze a reflectance may be 1e9, of which a quotient over a step of `STEP`
+        has rounding of a tenth: slopes are not asked for more than `FLOOR` of the reflectance.
+        """
+        return np.maximum(size, np.maximum(self.floor, FLOOR * abs(self.value))[rows])
+
     def beyond(self, ssa):
         """Columns with more conservative scattering than single precision is for."""
         tau = np.where(1 - ssa < CONSERVATIVE, self.columns["tau"], 0).sum(axis=1)
@@ -178,7 +187,7 @@ class Judged:
                 for step in (1, 2)
             )
             quotient = (4 * once - twice - 3 * self.value) / (2 * STEP)
-            self._errors("partial", abs(quotient - partial_slope) / np.maximum(size, self.floor))
+            self._errors("partial", abs(quotient - partial_slope) / self.scale_of(size))
         else:
             _, exact = both(double, self.streams)
             wide = {name: x.astype(np.float64) for name, x in directions.items()}
@@ -186,7 +195,7 @@ class Judged:
             self._errors("float32 slope", abs(reverse - right) / np.maximum(sizes, self.floor))
             right, size = along(exact, self.one)
             found = along(slopes, self.one)[0]
-            self._errors("float32 partial", abs(found - right) / np.maximum(size, self.floor))
+            self._errors("float32 partial", abs(found - right) / self.scale_of(size))
         if self.streams <= JIT_UP_TO:
             (_, inside), slopes = both_inside_jit(columns, self.streams)
             self._errors("inside jit", self._apart(np.asarray(inside, float), self.value))

@@ -8,6 +8,7 @@ layer stands for the layer). `amounts_of` gives one number a layer for each.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -166,7 +167,11 @@ def amounts_of(atmosphere: Atmosphere, wanted: Sequence[Amount]) -> list[Float[A
 def _mixed_paths(atmosphere: Atmosphere, amounts: Sequence[MixedGas]) -> Sequence[Array]:
     relative = atmosphere.counted_pressure / STANDARD_PRESSURE
     exponent = _column([x.exponent for x in amounts], relative)
-    return jnp.unstack(jnp.diff(relative * _power(relative[None], exponent)))
+    paths = jnp.diff(relative * _power(relative[None], exponent))
+    # Where a product and the difference are joined in one rounding, levels at one pressure (and
+    # those an ulp apart) have a little less than nothing between them.
+    rounding = jnp.where(jnp.diff(relative) >= 0, jnp.minimum(paths, 0), 0)
+    return jnp.unstack(paths - jax.lax.stop_gradient(rounding))
 
 
 def _vapour_paths(

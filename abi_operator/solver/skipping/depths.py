@@ -48,14 +48,21 @@ def depths(
     sun_secants
         Of each layer's beam. [-]
     """
-    layers = jax.lax.stop_gradient((tau, coalbedo, backward, sun_secants))
-    return Depths(*one_kernel(_summed, 1)(*layers))
+    return Depths(*sums(tau, coalbedo, backward, sun_secants))
 
 
-def _summed(*layers):
-    def one(k, sums):
-        tau, coalbedo, backward, secant = (read(x, k) for x in layers)
-        terms = tau, coalbedo * tau, backward * tau, secant * tau
-        return tuple(x + term for x, term in zip(sums, terms, strict=True))
+def sums(
+    tau: Float[Array, "layer *batch"], *numbers: Float[Array, "layer *batch"]
+) -> tuple[Float[Array, "*batch"], ...]:
+    """Optical depth of all layers, and sums of each of some numbers times it; in one pass, without
+    derivatives."""
+    return one_kernel(_sums, 1)(*jax.lax.stop_gradient((tau, *numbers)))
 
-    return jax.lax.fori_loop(0, len(layers[0]), one, (jnp.zeros_like(layers[0][0]),) * 4)
+
+def _sums(*layers):
+    def one(k, found):
+        tau, *numbers = (read(x, k) for x in layers)
+        terms = tau, *(x * tau for x in numbers)
+        return tuple(x + term for x, term in zip(found, terms, strict=True))
+
+    return jax.lax.fori_loop(0, len(layers[0]), one, (jnp.zeros_like(layers[0][0]),) * len(layers))

@@ -12,7 +12,7 @@ from ..method.doublings import Doublings, layer_doublings
 from ..method.mode_layers import Layers, read
 from . import budget
 from .budget import Expected
-from .depths import depths
+from .depths import sums
 from .grouping import Alike, Groups, Limits, grouped
 from .heat import Warm
 from .merging import Solved, handed_back, merged
@@ -66,7 +66,9 @@ class Plan(eqx.Module):
         all modes are solved.
     peaked
         1 for columns of which two modes in a row may be small by chance, else 0: their phase
-        functions have peaks, whose modes hardly decay. None where all modes are solved.
+        functions have forward peaks that delta-M leaves a part of, whose modes hardly decay. 2 for
+        those with backward peaks, of which any number of modes may: they are all solved. None where
+        all modes of all columns are solved.
     """
 
     layers: LayersOfModes
@@ -173,16 +175,17 @@ def planned(
 
 
 def _peaked(layers: LayersOfModes) -> Float[Array, "*batch"]:
-    """1 for columns of phase functions with forward peaks that `budget.FITTED_TO` streams do not
-    resolve, or with backward ones, of which delta-M leaves all that they are."""
+    """1 for columns of phase functions with forward peaks that the streams do not resolve, 2 for
+    those with backward ones, of which delta-M leaves all that they are."""
     degrees = layers.moments[1]
     num_streams = 2 * degrees.shape[1]
-    if num_streams > budget.FITTED_TO:
-        return jnp.ones_like(layers.tau[0])
-    backwards = jnp.maximum(-degrees[:, -1] / (2 * num_streams - 1), 0)
-    of_these = depths(layers.tau, layers.coalbedo, backwards, layers.sun_secants)
-    some = of_these.backward > budget.BACKWARD * (of_these.tau - of_these.absorbed)
-    return some.astype(layers.tau.dtype)
+    last = degrees[:, -1] / (2 * num_streams - 1)
+    peaks = jnp.maximum(-last, 0), jnp.maximum(last, 0)
+    tau, absorbed, backward, forward = sums(layers.tau, layers.coalbedo, *peaks)
+    scattered = tau - absorbed
+    sharp = forward > budget.FORWARD / num_streams * scattered
+    sharp = sharp | (num_streams > budget.FITTED_TO)
+    return jnp.where(backward > budget.BACKWARD * scattered, 2, sharp.astype(tau.dtype))
 
 
 def _middle(layers: LayersOfModes) -> Float[Array, "layer *batch"] | None:
@@ -274,7 +277,10 @@ def over_modes(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
         wanting = (
-            (share > 1) | (latest * before[0] > 1) | ((peaked > 0) & (earlier * before[1] > 1))
+            (share > 1)
+            | (latest * before[0] > 1)
+            | ((peaked > 0) & (earlier * before[1] > 1))
+            | (peaked > 1)
         )
         before = share, before[0]
         return m + 1, carry, rows, before, jnp.where(wanting & beyond, counts, 0)
