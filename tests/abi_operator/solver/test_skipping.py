@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from abi_operator.solver import cos_scattering_angle, slant_path_secant, toa_brf
+from abi_operator.solver import slant_path_secant, toa_brf
 from abi_operator.solver.method.doublings import reaches
 from abi_operator.solver.skipping.budget import Expected
 from abi_operator.solver.skipping.grouping import Alike, Limits, grouped
@@ -307,31 +307,6 @@ def test_modes_end_at_a_small_one_after_one_that_is_not_large():
     assert modes_that_count(sharp, [9, 2, 0.1, 9, 9]) == 3
     assert modes_that_count(sharp, [99, 2, 0.1, 9, 9]) == 5
     assert modes_that_count(-0.1, [0.1, 0.1, 0.1, 0.1, 9]) == 5
-
-
-@pytest.mark.parametrize(("g", "streams"), [(0.999, 8), (-0.9, 16)])
-def test_peaks_in_absorbing_air_keep_the_budget(g, streams):
-    """Of modes that are 0 to 1e-4 of the budget up to the sixth and ten times it from there on."""
-    rng = np.random.default_rng(8)
-    count = 400
-    given = {
-        "tau": 10 ** rng.uniform(-3, 1, (count, LAYERS)),
-        "ssa": rng.uniform(0.5, 1, (count, LAYERS)),
-        "moments": np.broadcast_to(g ** np.arange(streams + 1.0), (count, LAYERS, streams + 1)),
-        "albedo": np.ones(count),
-        "mu0": rng.uniform(0.3, 0.7, count),
-        "mu": rng.uniform(0.3, 0.7, count),
-        "relative_azimuth": rng.uniform(0, np.pi, count),
-    }
-    angles = (jnp.asarray(given[name]) for name in ("mu0", "mu", "relative_azimuth"))
-    cosine = np.asarray(cos_scattering_angle(*angles))
-    phase = (1 - g**2) / (1 + g**2 - 2 * g * cosine) ** 1.5
-    given["phase_function"] = np.broadcast_to(phase[:, None], (count, LAYERS))
-    within, whole = (
-        np.asarray(toa_brf(**given, num_streams=streams, error_budget=x)) for x in (1e-3, None)
-    )
-    error = abs(within - whole) / np.maximum(abs(whole), 0.01)
-    assert error.max() < 1e-3
 
 
 def test_a_thin_black_layer_is_not_spread_through_a_thick_white_one():
