@@ -52,6 +52,11 @@ class Surroundings(NamedTuple):
     deviation: np.ndarray
 
 
+def hottest_of(bands: tuple[str, ...]) -> int:
+    """Number of the band in which fires are looked for: that of the longest wavelength."""
+    return bands.index(max(bands))
+
+
 def surroundings(
     measured: np.ndarray,
     bands: tuple[str, ...],
@@ -69,7 +74,7 @@ def surroundings(
     threshold
         Score from which a pixel burns and is no surroundings of others. [-]
     """
-    hottest = bands.index(max(bands))
+    hottest = hottest_of(bands)
     image = measured[hottest]
     noise = noise_sigma(np.nan_to_num(image), bands[hottest], imager)
     burning = _robust_score(image, noise) >= threshold

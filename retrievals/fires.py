@@ -22,24 +22,24 @@ from typing import Any, Literal, get_args
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
 from abi_operator import Fire, State
 from abi_operator.bands import check_bands
 from abi_operator.files import InputError
-from abi_operator.instrument import Imager, reflectance_factor_from_radiance
+from abi_operator.instrument import Imager
 from abi_operator.machine.speed import Kept
-from abi_operator.nomenclature import QUALITY_FLAGS, SCENARIO
+from abi_operator.nomenclature import SCENARIO
 from abi_operator.radiance import FIRE_BANDS
 from abi_operator.scene import states_of_result
 from abi_operator.settings import streams_of_attributes
 
 from .chunks import map_chunks
 from .declarations import assumed_of_fire, fire
-from .fire_detection import DETECTED, Surroundings, surroundings
-from .forward import THERMAL, ForwardModel, prepared
+from .fire_detection import DETECTED, Surroundings, hottest_of
+from .fire_pixels import codes_before, measured_light, surroundings_by_day_and_night
+from .forward import ForwardModel, prepared
 from .images import (
     forward_model,
     how_made,
@@ -49,12 +49,10 @@ from .images import (
 )
 from .inverse import DEFAULT_MINIMISER, Minimiser
 from .observation import (
-    UNUSABLE,
     Observation,
     add_noise,
     distance_of,
     imager_of,
-    known_saturated,
     measurement,
 )
 from .prior import Prior
@@ -72,8 +70,6 @@ WhereOfFires = Literal["detected", "all"]
 WHERE_OF_FIRES: tuple[WhereOfFires, ...] = get_args(WhereOfFires)
 """Where fires are retrieved, see `retrieve_fires`."""
 
-# A fire shines by night too.
-_UNUSABLE = UNUSABLE & ~QUALITY_FLAGS["night"]
 _HEAT = ("temperature", "surface_temperature")
 
 
@@ -105,8 +101,9 @@ def retrieve_fires(
     background
         One of `BACKGROUNDS`.
     where, threshold
-        ``"detected"``: where the score of `fire_detection` reaches the threshold; ``"all"``: at
-        every usable pixel, those without score, too.
+        ``"detected"``: where the score of `fire_detection` reaches the threshold, and where the
+        band that it looks at is missing the code is ``INVALID_INPUT``; ``"all"``: at every usable
+        pixel, those without score, too.
     assumed
         What is not retrieved, for the diagnostics; None for `assumed_of_fire`.
     noise, seed, prior, diagnostics, num_streams, minimiser, attributes
@@ -136,19 +133,22 @@ def retrieve_fires(
         forward = forward_model(dataset, vector, bands, num_streams)
         imager = imager_of(dataset)
         images = images_of(dataset)
-        measured, limited = _measured(images, bands, imager)
+        measured, limited = measured_light(images, bands, imager)
         if noise:
             measured = add_noise(measured, seed, imager, limited)
         measured, limited = (
             each.transpose("image", "band", "y", "x").values for each in (measured, limited)
         )
         around = [
-            _surroundings(image, values, bands, imager, threshold)
+            surroundings_by_day_and_night(image, values, bands, imager, threshold)
             for image, values in zip(images, measured, strict=True)
         ]
+        hottest = hottest_of(bands)
         codes = np.stack(
             [
-                _codes(image, values, found, threshold if where == "detected" else None)
+                codes_before(
+                    image, values, found, threshold if where == "detected" else None, hottest
+                )
                 for image, values, found in zip(images, measured, around, strict=True)
             ]
         )
@@ -203,63 +203,6 @@ def _check(dataset: xr.Dataset, bands: tuple[str, ...], num_unknowns: int, prior
         raise InputError(
             f"{num_unknowns} unknowns need as many bands, or a prior; got {', '.join(bands)}."
         )
-
-
-def _measured(
-    images: Sequence[xr.Dataset], bands: tuple[str, ...], imager: Imager
-) -> tuple[xr.DataArray, xr.DataArray]:
-    """Reflectance factor, or radiance in C07, of all the light that arrives; and where a result
-    says that it is saturated.
-    """
-    dims, parts, limited = ("band", "y", "x"), [], []
-    for image in images:
-        distance = distance_of(image)
-        seen = image["radiance"].sel(band=list(bands)).transpose(*dims)
-        values = seen.values.astype(np.float64)
-        for i, band in enumerate(bands):
-            if band != THERMAL:
-                values[i] = reflectance_factor_from_radiance(
-                    jnp.asarray(values[i]), band, imager.satellite, distance
-                )
-        parts.append(values)
-        known = known_saturated(image)
-        known = xr.zeros_like(seen, bool) if known is None else known.sel(band=list(bands))
-        limited.append(known.transpose(*dims).values)
-    measured, saturated = (
-        xr.DataArray(np.stack(each), {"band": list(bands)}, ("image", *dims))
-        for each in (parts, limited)
-    )
-    return measured, saturated
-
-
-def _surroundings(
-    image: xr.Dataset,
-    measured: np.ndarray,
-    bands: tuple[str, ...],
-    imager: Imager,
-    threshold: float,
-) -> Surroundings:
-    """Those of the pixels by day among these, and of the others by night."""
-    night = (image["quality_flag"].values.astype(int) & QUALITY_FLAGS["night"]) != 0
-    dark, lit = (
-        surroundings(np.where(side, measured, np.nan), bands, imager, threshold)
-        for side in (night, ~night)
-    )
-    return Surroundings(*(np.where(night, *pair) for pair in zip(dark, lit, strict=True)))
-
-
-def _codes(
-    image: xr.Dataset, measured: np.ndarray, around: Surroundings, threshold: float | None
-) -> np.ndarray:
-    """Result code of the pixels that are not to be attempted, 0 (success) elsewhere; without
-    threshold whatever their score.
-    """
-    codes = np.full(measured.shape[1:], ResultCode.SUCCESS, np.int8)
-    if threshold is not None:
-        codes[~(around.score >= threshold)] = ResultCode.NO_PLUME
-    codes[~np.isfinite(measured).any(axis=0)] = ResultCode.INVALID_INPUT
-    codes[(image["quality_flag"].values.astype(int) & _UNUSABLE) != 0] = ResultCode.UNUSABLE
-    return codes
 
 
 def _gathered(

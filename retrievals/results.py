@@ -37,7 +37,8 @@ _MESSAGES = {
         "nothing or more than all."
     ),
     ResultCode.INVALID_INPUT: (
-        "Not attempted: no measurement, one that is no reflectance factor (above 2: in percent?), "
+        "Not attempted: no measurement (of fires: in the band in which they stand out, which "
+        "where='all' does without), one that is no reflectance factor (above 2: in percent?), "
         "a sigma that is not above 0, or a prior that is not finite; repair the input."
     ),
     ResultCode.NOT_CONVERGED: (

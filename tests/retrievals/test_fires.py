@@ -152,7 +152,7 @@ def test_all_are_pixels_without_score_too(burning):
     alone["quality_flag"][:] = QUALITY_FLAGS["no_albedo"]
     alone["quality_flag"][place] = 0
     alone["radiance"][(2, *place)] = np.nan
-    assert retrieve_fires(alone)["result_code"].values[place] == ResultCode.NO_PLUME
+    assert retrieve_fires(alone)["result_code"].values[place] == ResultCode.INVALID_INPUT
     found = retrieve_fires(alone, where="all")
     assert (found["result_code"].values == ResultCode.UNUSABLE).sum() == np.prod(SHAPE) - 1
     assert found["result_code"].values[place] == ResultCode.SUCCESS
