@@ -113,13 +113,12 @@ class OpticalProperties(eqx.Module):
     def _mean(self, of_kind: Callable[[Array, PhaseFunction], Array]) -> Array:
         """Sum over the scatterers by their shares, those of a kind as one batch; 0 of none."""
         scattering = self.scattering
-        inverse = safe_divide(jnp.ones_like(scattering), scattering)
         kinds: dict[Any, list[Scatterer]] = {}
         for scatterer in self.scatterers:
             kinds.setdefault(jax.tree.structure(scatterer.phase), []).append(scatterer)
         found = []
         for same in kinds.values():
-            shares = jnp.stack([s.scattering * inverse for s in same])
+            shares = safe_divide(jnp.stack([s.scattering for s in same]), scattering)
             phases = jax.tree.map(
                 lambda *x: jnp.stack(jnp.broadcast_arrays(*x)), *(s.phase for s in same)
             )

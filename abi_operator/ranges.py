@@ -66,11 +66,16 @@ _INF = math.inf
 
 FINITE = Range(-_INF, _INF, "()")
 SHARE = Range(0.0, 1.0)
+# Below what nobody means, as units mixed up give it, and before products of amounts are no numbers:
+# of a layer of 1e20 the light is off by 1 %, of one of 1e30 by anything.
+_DEPTH = Range(0.0, 1e10, "[)")
+_SOURCE = Range(0.0, 1e20, "[)")
 _NOT_NEGATIVE = Range(0.0, _INF, "[)")
-_POSITIVE = Range(0.0, _INF, "()")
+_AMOUNT = Range(0.0, 1e6, "[)")
+_POSITIVE = Range(0.0, 1e6, "()")
 _COSINE = Range(0.0, 1.0, "(]")
-_EDGE = Range(0.0, _INF, "[)", "m")
-_TEMPERATURE = Range(0.0, _INF, "()", "K")
+_EDGE = Range(0.0, 1e9, "[)", "m")
+_TEMPERATURE = Range(0.0, 1e5, "()", "K")
 _ZENITH = Range(0.0, math.pi, "[]", "rad", "0 to pi (angles are in rad)")
 # A difference of two azimuths is 2 pi at most, in float32 too; what is more is degrees.
 _AZIMUTH = Range(-6.2832, 6.2832, "[]", "rad", "-2 pi to 2 pi (angles are in rad)")
@@ -78,47 +83,48 @@ _AZIMUTH = Range(-6.2832, 6.2832, "[]", "rad", "-2 pi to 2 pi (angles are in rad
 _ASYMMETRY = Range(-1.0, 1.0, "()")
 
 SOLVER: dict[str, Range] = {
-    "tau": _NOT_NEGATIVE,
+    "tau": _DEPTH,
     "ssa": SHARE,
     "moments": Range(-1.0, 1.0),
     "albedo": SHARE,
     "mu0": _COSINE,
     "mu": _COSINE,
     "relative_azimuth": _AZIMUTH,
+    # That of an asymmetry factor a hair below 1 is 1e32.
     "phase_function": _NOT_NEGATIVE,
     "secant": _POSITIVE,
-    "solar_irradiance": _NOT_NEGATIVE,
-    "planck_levels": _NOT_NEGATIVE,
-    "surface_emission": _NOT_NEGATIVE,
-    "isotropic_top": _NOT_NEGATIVE,
+    "solar_irradiance": _SOURCE,
+    "planck_levels": _SOURCE,
+    "surface_emission": _SOURCE,
+    "isotropic_top": _SOURCE,
 }
 """By argument of the solver, in the order of the call."""
 
 STATE: dict[str, Range] = {
-    "pressure": Range(0.0, _INF, "[)", "Pa"),
+    "pressure": Range(0.0, 1e7, "[)", "Pa"),
     "temperature": _TEMPERATURE,
     "surface_temperature": _TEMPERATURE,
-    "height": FINITE,
-    "mass_path": Range(0.0, _INF, "[)", "kg m-2"),
-    "number_path": Range(0.0, _INF, "[)", "m-2"),
-    "vapour": Range(0.0, _INF, "[)", "kg m-2"),
-    "ozone": Range(0.0, _INF, "[)", "DU"),
+    "height": Range(-1e9, 1e9, "()", "m"),
+    "mass_path": Range(0.0, 1e6, "[)", "kg m-2"),
+    "number_path": Range(0.0, 1e20, "[)", "m-2"),
+    "vapour": Range(0.0, 1e6, "[)", "kg m-2"),
+    "ozone": Range(0.0, 1e9, "[)", "DU"),
     "carbon_dioxide": SHARE,
     "methane": SHARE,
     "nitrous_oxide": SHARE,
     "base": _EDGE,
     "top": _EDGE,
-    "aod_550": _NOT_NEGATIVE,
-    "scale_height": Range(0.0, _INF, "()", "m"),
-    "extinction_550": Range(0.0, _INF, "[)", "m-1"),
+    "aod_550": _AMOUNT,
+    "scale_height": Range(0.0, 1e9, "()", "m"),
+    "extinction_550": Range(0.0, 1e6, "[)", "m-1"),
     "brightness": SHARE,
-    "relative_extinction": _NOT_NEGATIVE,
+    "relative_extinction": _AMOUNT,
     "ssa": SHARE,
     "asymmetry": _ASYMMETRY,
-    "effective_radius_um": Range(0.0, _INF, "()", "um"),
+    "effective_radius_um": Range(0.0, 1e6, "()", "um"),
     "fraction": SHARE,
     "albedo": SHARE,
-    "wind_speed": Range(0.0, _INF, "[)", "m s-1"),
+    "wind_speed": Range(0.0, 1e3, "[)", "m s-1"),
     "solar_zenith": _ZENITH,
     "view_zenith": _ZENITH,
     "relative_azimuth": _AZIMUTH,

@@ -83,3 +83,19 @@ def test_derivatives_are_finite_in_empty_layers(mode):
     jacobian = jax.jit(mode(derived, argnums=(0, 1)))(AIR, SMOKE)
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(jacobian))
     assert np.any(jax.tree.leaves(jacobian)[0])
+
+
+def test_shares_of_hardly_anything_have_slopes_of_their_size():
+    """Of a number of particles of 1e-36 the scattering rises by 1e18 a particle, in float32."""
+    scattering, rise = (jnp.asarray([x], jnp.float32) for x in (1e-18, 1e18))
+
+    def mixed(amount):
+        scatterers = tuple(
+            Scatterer(x, Linear(jnp.asarray([chi], jnp.float32)))
+            for x, chi in ((amount, 0.3), (jnp.asarray([1e-18], jnp.float32), 0.1))
+        )
+        return OpticalProperties(amount[None], jnp.ones(1, jnp.float32), scatterers).moments(2)
+
+    found, slope = jax.jvp(mixed, (scattering,), (rise,))
+    np.testing.assert_allclose(found, [[1, 0.2]], rtol=1e-6)
+    np.testing.assert_allclose(slope[:, 1], [1e36 * 0.05], rtol=1e-5)
