@@ -68,7 +68,7 @@ FINITE = Range(-_INF, _INF, "()")
 SHARE = Range(0.0, 1.0)
 # Below what nobody means, as units mixed up give it, and before products of amounts are no numbers:
 # of a layer of 1e20 the light is off by 1 %, of one of 1e30 by anything.
-_DEPTH = Range(0.0, 1e10, "[)")
+_DEPTH = Range(0.0, 1e15, "[)")
 _SOURCE = Range(0.0, 1e20, "[)")
 _NOT_NEGATIVE = Range(0.0, _INF, "[)")
 _AMOUNT = Range(0.0, 1e6, "[)")

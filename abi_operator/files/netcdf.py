@@ -12,6 +12,7 @@ import xarray as xr
 from ..nomenclature import variable
 from .completeness import check_complete
 from .errors import InputError
+from .opening import opened_in_time
 
 FilePath: TypeAlias = str | PathLike[str]
 
@@ -28,10 +29,8 @@ _PACKING = ("scale_factor", "add_offset")
 def open_netcdf(
     path: FilePath, *, mask_and_scale: bool = True, advice: str = "give a NetCDF file"
 ) -> xr.Dataset:
-    """Open a NetCDF file lazily, with times left as numbers; one that broke off is refused.
-
-    Within a file damaged just so (one of 1,800 damaged copies in `tests/stress`) the HDF5 library
-    may look for a name for ever; ^C ends a command there, too.
+    """Open a NetCDF file lazily, with times left as numbers; one that broke off is refused, and
+    one in which the library finds no end (`opening`).
 
     Parameters
     ----------
@@ -51,14 +50,7 @@ def open_netcdf(
             f"{path} cannot be read ({error.strerror}); check who may read it."
         ) from error
     try:
-        dataset = xr.open_dataset(
-            Path(path).absolute(),
-            engine="netcdf4",
-            decode_times=False,
-            decode_timedelta=False,
-            decode_coords=False,
-            mask_and_scale=mask_and_scale,
-        )
+        dataset = opened_in_time(path, mask_and_scale=mask_and_scale)
     except _UNREADABLE as error:
         raise InputError(f"{path} cannot be read as NetCDF ({error}); {advice}.") from error
     try:

@@ -19,11 +19,12 @@ import netCDF4
 import numpy as np
 from hostile_readers import NETCDF, READERS
 
-from abi_operator.files import InputError
+from abi_operator.files import InputError, opening
 
 SEED = 7
 MEMORY = 3 << 30  # of addresses: JAX and its threads take most of it [byte]
 SECONDS = 20  # a copy may take
+PATIENCE = 5.0  # with its opening [s]
 
 
 def damaged(original, number, kind):
@@ -104,6 +105,7 @@ def main():
     faulthandler.enable()
     warnings.simplefilter("ignore")
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    opening.PATIENCE = PATIENCE
     original = file.read_bytes()
     for number in range(first, first + count):
         print(json.dumps([number, "begun", ""]), flush=True)
@@ -113,6 +115,8 @@ def main():
         signal.alarm(0)
         path.unlink()
         print(json.dumps([number, verdict, said]), flush=True)
+        if opening.never_opened():  # nothing else will be
+            break
 
 
 if __name__ == "__main__":

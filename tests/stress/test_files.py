@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -28,7 +27,6 @@ from retrievals.product_file import read_retrieval
 
 FORMATS = ("wrf", "mcd43", "plume", "result", "prior")
 FORMATS += ("fires", "observed", "radiance", "imagery", "retrieval", "baseline", "part")
-HUNG = f"ended with {-signal.SIGALRM}:"
 HOSTILE = Path(__file__).with_name("hostile.py")
 ROOT = Path(__file__).parents[2]
 
@@ -73,10 +71,6 @@ def assert_in_words(kind, file, first, count):
     found = verdicts(kind, file, first, count)
     assert len(found) == count
     failed = {number: said for number, (verdict, said) in found.items() if verdict == "failed"}
-    hung = [number for number, said in failed.items() if said.startswith(HUNG)]
-    if kind in NETCDF:  # `open_netcdf` tells of it
-        assert len(hung) <= 1 + count / 200, hung
-        failed = {number: said for number, said in failed.items() if number not in hung}
     assert not failed, "\n".join(f"{number}: {said}" for number, said in failed.items())
     refused = sum(verdict == "refused" for verdict, _ in found.values())
     assert refused > count / 5  # the damage is seen
