@@ -9,6 +9,7 @@ from typing import Any
 import typer
 
 from .files import InputError
+from .files.opening import leave_where_the_library_is_lost
 
 
 @contextmanager
@@ -18,6 +19,7 @@ def one_sentence() -> Iterator[None]:
         yield
     except InputError as error:
         typer.echo(f"abi-operator: {error}", err=True)
+        leave_where_the_library_is_lost(2)
         raise typer.Exit(2) from None
 
 

@@ -51,6 +51,8 @@ def open_netcdf(
         ) from error
     try:
         dataset = opened_in_time(path, mask_and_scale=mask_and_scale)
+    except InputError:
+        raise
     except _UNREADABLE as error:
         raise InputError(f"{path} cannot be read as NetCDF ({error}); {advice}.") from error
     try:

@@ -3,8 +3,10 @@
 from threading import Event
 
 import pytest
+import typer
 import xarray as xr
 
+from abi_operator.commands import one_sentence
 from abi_operator.files import InputError, opening
 from abi_operator.files.netcdf import open_netcdf
 
@@ -25,6 +27,11 @@ def test_nobody_waits_endlessly(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"never.nc does not open in 0.01 s: it is damaged"):
         open_netcdf(path)
     assert opening.never_opened() == [str(path)]
+    left = []
+    monkeypatch.setattr(opening.os, "_exit", left.append)
+    with pytest.raises(typer.Exit), one_sentence():
+        open_netcdf(path)
+    assert left == [2]  # and not through the library's end, under its search
     monkeypatch.setattr(xr, "open_dataset", real)
     monkeypatch.setattr(opening, "PATIENCE", 60.0)
     with pytest.raises(InputError, match=r"other.nc cannot be opened: .* still at .*never.nc"):
@@ -34,6 +41,9 @@ def test_nobody_waits_endlessly(tmp_path, monkeypatch):
     for thread in opening._late.values():
         thread.join()
     assert opening.never_opened() == []
+    with pytest.raises(typer.Exit), one_sentence():
+        open_netcdf(tmp_path / "none.nc")
+    assert left == [2]
     with open_netcdf(other) as dataset:
         assert dataset["x"].values.tolist() == [1.0, 2.0]
 
