@@ -15,10 +15,10 @@ Minimised is the sum over all pixels,
 
 .. math:: \sum_p |r_p(z_p)|^2 + \sum_k z_k^T Q z_k,
 
-by steps of Gauss and Newton, damped where they would not descend, from the solutions of single
-pixels. As each pixel's residuals depend on its own z alone, :math:`J^T J` is a small block for each
-of them, and :math:`A = J^T J + Q` is never stored: conjugate gradients (lineax), preconditioned by
-A's diagonal blocks, ask for products with it.
+by steps of Gauss and Newton, in which each pixel is damped where it is far from linear, from the
+solutions of single pixels. As each pixel's residuals depend on its own z alone, :math:`J^T J` is a
+small block for each of them, and :math:`A = J^T J + Q` is never stored: conjugate gradients
+(lineax), preconditioned by A's diagonal blocks, ask for products with it.
 
 The diagonal blocks of the posterior covariance :math:`A^{-1}` are estimated from draws s of it,
 

@@ -22,7 +22,8 @@ from .precision import Smoothness
 class Linearised(NamedTuple):
     """Whitened residuals of the measurements and their Jacobians in z, block by block.
 
-    Both are 0 of pixels that are not `fine`, of which something was not finite.
+    Both are 0 of pixels that are not `fine`, of which something was not finite, or so large that
+    its square is not: in a sum over the image it would leave no other pixel a number.
     """
 
     residual: Float[Array | np.ndarray, "pixel band"]
@@ -65,7 +66,9 @@ def _linearise_chunk(
             return observation.departure(forward, x, state)
 
         value, jacobian = value_and_jacobian(residual, z)
-        fine = jnp.isfinite(value).all() & jnp.isfinite(jacobian).all()
+        # As large as the square of a gradient becomes, which conjugate gradients need.
+        fine = jnp.isfinite(jnp.sum(value**2) * jnp.sum(jacobian**2))
+        fine &= jnp.isfinite(jnp.sum(value**2)) & jnp.isfinite(jnp.sum(jacobian**2))
         return Linearised(jnp.where(fine, value, 0), jnp.where(fine, jacobian, 0), fine)
 
     return jax.vmap(of_one)(priors, observations, states, z)

@@ -1,6 +1,7 @@
 """Linear systems with A, the curvature of the joint sum, by conjugate gradients."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -18,22 +19,46 @@ NUM_DRAWS = 32
 _RELATIVE_RESIDUAL = 1e-6
 _MAX_CG_STEPS = 2000
 
+STUCK = 1e6
+"""Damping of a pixel that is left where it is: a millionth of a step is none. [-]"""
+
 Product = Callable[[Float[Array, "pixel x"]], Float[Array, "pixel x"]]
 
 
+class JointStep(NamedTuple):
+    """A damped step of Gauss and Newton.
+
+    Parameters
+    ----------
+    step
+        Of z; none of pixels that are `STUCK`. [-]
+    square
+        In the metric of A, of the step without damping as far as a pixel's own part tells. [-]
+    own
+        The same of each pixel alone, its neighbours where they are. [-]
+    """
+
+    step: Float[Array, "pixel x"]
+    square: Float[Array, ""]
+    own: Float[Array, " pixel"]
+
+
 def system(
-    here: Linearised, smooth: Smoothness, damping: Float[Array, ""] | float = 0.0
+    here: Linearised, smooth: Smoothness, damping: Float[Array, " pixel"] | float = 0.0
 ) -> tuple[Product, Float[Array, "pixel x x"], Float[Array, "pixel x x"]]:
-    """Products with A, the inverses of its diagonal blocks, and these; damped by shares of them."""
+    """Products with A, the inverses of its diagonal blocks, and these; damped by shares of them,
+    which each pixel may have of its own.
+    """
     normal = jnp.einsum("pbx,pby->pxy", here.jacobian, here.jacobian)
     unit = jnp.eye(normal.shape[-1], dtype=normal.dtype)
     blocks = normal + smooth.diagonal()[:, None, None] * unit
-    damped = normal + damping * blocks
+    more = jnp.asarray(damping, normal.dtype)[..., None, None] * blocks
+    damped = normal + more
 
     def matrix(v: Float[Array, "pixel x"]) -> Float[Array, "pixel x"]:
         return jnp.einsum("pxy,py->px", damped, v) + smooth(v)
 
-    return matrix, jnp.linalg.inv(blocks + damping * blocks), blocks
+    return matrix, jnp.linalg.inv(blocks + more), blocks
 
 
 def solved(matrix: Product, inverse_blocks: Array, right: Float[Array, "pixel x"]) -> Array:
@@ -50,12 +75,16 @@ def solved(matrix: Product, inverse_blocks: Array, right: Float[Array, "pixel x"
 
 @eqx.filter_jit
 def joint_step(
-    here: Linearised, smooth: Smoothness, z: Array, damping: Float[Array, ""]
-) -> tuple[Float[Array, "pixel x"], Float[Array, ""]]:
-    """A damped step of Gauss and Newton, and its square in the metric of A. [-]"""
-    matrix, inverse_blocks, _ = system(here, smooth, damping)
+    here: Linearised, smooth: Smoothness, z: Array, damping: Float[Array, " pixel"]
+) -> JointStep:
+    """The step from z where each pixel is damped by shares of its diagonal block. [-]"""
+    matrix, inverse_blocks, blocks = system(here, smooth, damping)
     step = solved(matrix, inverse_blocks, -joint_gradient(here, smooth, z))
-    return step, jnp.sum(step * matrix(step))
+    step = jnp.where((damping < STUCK)[:, None], step, 0)
+    whole = (1 + damping)[:, None] * step
+    undamped, _, _ = system(here, smooth)
+    own = jnp.einsum("px,pxy,py->p", whole, blocks, whole)
+    return JointStep(step, jnp.sum(whole * undamped(whole)), own)
 
 
 @eqx.filter_jit

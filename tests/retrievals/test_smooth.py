@@ -107,6 +107,8 @@ def test_neighbours_are_those_that_are_retrieved():
     assert pairs == first | second
     with pytest.raises(ValueError, match="above 0 pixels; got 0"):
         smoothness(chosen, 0.0)
+    with pytest.raises(ValueError, match="at most 8192 pixels, as .* got 100000"):
+        smoothness(chosen, 1e5)
 
 
 def test_the_gradient_is_that_of_the_cost(image):
@@ -172,6 +174,9 @@ def test_what_is_no_number_any_more_is_not_won():
     linearise = partial(linearised, Edge(), usable, ground, own)
     z, here, _, _ = _descended(linearise, smooth, np.zeros((3, 1)), 1e-2, 5)
     assert here.fine.all() and (0 < z).all() and (z <= 1).all()
+    # It is left there before the steps run out, and only it has not converged.
+    _, _, steps, converged = _descended(linearise, smooth, np.zeros((3, 1)), 1e-2, 40)
+    assert steps < 40 and converged.tolist() == [True, False, True]
     # Single pixels that end with their first step, there: the code says what the joint ones found.
     how = Minimiser(0.999, starts="prior")
     found = retrieve_smooth(Edge(), observation, ground, prior=prior, smooth=smooth, minimiser=how)
@@ -188,3 +193,62 @@ def test_a_pixel_without_measurements_is_filled_and_says_so(image):
     assert np.isfinite(found.inversion.x).all()
     around = found.inversion.x[[99, 101, 84, 116]]
     assert (np.abs(found.inversion.x[100] - around.mean(axis=0)) < 2 * np.ptp(around, axis=0)).all()
+
+
+def test_a_pixel_that_nothing_explains_holds_no_other_up(image):
+    """Its minimum is reached by small steps, and all pixels had these: none had converged."""
+    observation, ground, x, smooth = image
+    measured = np.array(observation.measured)
+    sigma = np.array(observation.sigma)
+    measured[100], sigma[100] = 1.9, 0.003
+    broken = Observation(measured, sigma)
+    found = retrieve_smooth(TWO, broken, ground, prior=PRIOR, smooth=smooth)
+    assert found.codes[100] == ResultCode.POOR_FIT
+    row, col = np.divmod(np.arange(256), 16)
+    beside = (np.abs(row - 100 // 16) <= 1) & (np.abs(col - 100 % 16) <= 1)
+    assert np.mean(found.codes[~beside] == ResultCode.SUCCESS) > 0.95
+    assert set(found.codes[beside]) <= {ResultCode.SUCCESS, ResultCode.POOR_FIT}
+    success = found.codes == ResultCode.SUCCESS
+    sigma = np.sqrt(np.diagonal(found.inversion.covariance, axis1=1, axis2=2))
+    held = np.abs(found.inversion.x - x)[success] <= 1.96 * sigma[success]
+    assert (held.mean(axis=0) > 0.84).all()
+
+
+@pytest.mark.parametrize("wrong", ["sigma", "measured", "prior"])
+def test_a_pixel_whose_square_is_no_number_spoils_no_other(image, wrong):
+    """Others come out as where it measures nothing; with it no sum over the image was a number."""
+    observation, ground, _, smooth = image
+    arrays = {
+        "sigma": np.array(observation.sigma),
+        "measured": np.array(observation.measured),
+        "prior": np.tile(PRIOR.x_prior, (256, 1)),
+    }
+    missing = arrays["measured"].copy()
+    missing[100] = np.nan
+    arrays[wrong][100] = {"sigma": 1e-160, "measured": -1e300, "prior": 1e200}[wrong]
+    prior = Prior(arrays["prior"], PRIOR.S_prior)
+    broken = Observation(arrays["measured"], arrays["sigma"])
+    without = Observation(missing, observation.sigma)
+    found = retrieve_smooth(TWO, broken, ground, prior=prior, smooth=smooth)
+    expected = retrieve_smooth(TWO, without, ground, prior=PRIOR, smooth=smooth)
+    assert found.codes[100] == ResultCode.NONFINITE
+    others = np.arange(256) != 100
+    np.testing.assert_array_equal(found.codes[others], expected.codes[others])
+    sigma = np.sqrt(np.diagonal(expected.inversion.covariance, axis1=1, axis2=2))
+    moved = np.abs(found.inversion.x - expected.inversion.x) / sigma
+    assert moved[others].max() < 0.1  # what a last step leaves
+    assert np.isfinite(found.inversion.covariance[others]).all()
+
+
+def test_bounds_alone_are_no_success(image):
+    """As of single pixels: of what lies above a ceiling neighbours tell, and nothing measured."""
+    observation, ground, _, smooth = image
+    saturated = np.zeros((256, 3), bool)
+    saturated[100] = True
+    measured = np.where(saturated, 0.8, 1) * observation.measured
+    bounded = Observation(measured, observation.sigma, saturated)
+    found = retrieve_smooth(TWO, bounded, ground, prior=PRIOR, smooth=smooth)
+    assert found.codes[100] == ResultCode.NOT_OBSERVABLE
+    with pytest.raises(ValueError, match="smooth is of 9 pixels, and the observations are of 256"):
+        other = smoothness(np.ones((3, 3), bool), LENGTH)
+        retrieve_smooth(TWO, bounded, ground, prior=PRIOR, smooth=other)
