@@ -83,7 +83,10 @@ def result_codes(
     codes[rival.converged & rivalled] = ResultCode.MULTIPLE_SOLUTIONS
     codes[~explained] = ResultCode.POOR_FIT
     codes[~best.converged] = ResultCode.NOT_CONVERGED
-    codes[~np.isfinite(best.cost) | ~np.isfinite(best.x).all(-1)] = ResultCode.NONFINITE
+    finite = np.isfinite(best.cost) & np.isfinite(best.x).all(-1)
+    if not alone:  # beside a prior nothing is undetermined: what is NaN are slopes of the operator
+        finite &= ~np.isnan(best.covariance).any((-2, -1))
+    codes[~finite] = ResultCode.NONFINITE
     return codes
 
 

@@ -1,5 +1,6 @@
 """Which minima are trusted."""
 
+import equinox as eqx
 import numpy as np
 import pytest
 
@@ -50,6 +51,14 @@ def test_the_error_of_optical_depth_is_propagated():
 )
 def test_a_minimum_without_rival(best, expected):
     assert code(best) == expected
+
+
+def test_slopes_that_are_no_number_are_no_lack_of_steps():
+    """Beside a prior only they leave the covariance none; without, x may be undetermined."""
+    best = inversion(sigma=np.nan, converged=False)
+    assert code(best) == ResultCode.NOT_CONVERGED
+    best = eqx.tree_at(lambda i: i.prior_cost, best, np.array([0.1]))
+    assert code(best) == ResultCode.NONFINITE
 
 
 def test_noise_excuses_what_it_explains():
