@@ -34,7 +34,8 @@ def liquid_cloud() -> StateVector:
         sigma=1.5,
         mean=10.0,
         get=optical_thickness,
-        starts=(1.0, 5.0, 15.0, 40.0),
+        # Thin ones, too: from 1 on some of 0.1 end where much larger droplets explain as much.
+        starts=(0.1, 0.3, 1.0, 3.0, 10.0, 40.0),
     )
     radius = Quantity(
         "cloud_effective_radius_um",
