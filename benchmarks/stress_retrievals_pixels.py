@@ -1,4 +1,4 @@
-"""Pixels with a known truth, of smoke, ash and fires, and what the imager reports of them."""
+"""Pixels with a known truth, of smoke, ash, fires or cloud, and what the imager reports of them."""
 
 from typing import Any, NamedTuple
 
@@ -9,10 +9,12 @@ from retrievals_pixels import random_states
 from abi_operator import Atmosphere, Fire, LiquidCloud, State
 from abi_operator.instrument import IMAGER, Imager
 from retrievals import ForwardModel, Observation, Prior, StateVector, measurement, prepared
-from retrievals.declarations import fire, plume
+from retrievals.declarations import fire, liquid_cloud, plume
 
 LAYER = 17
 """Of 20, counted from the top, the one from 4 to 6 km, in which the clouds are."""
+SMOKE_ABOVE = 7e3, 9e3
+"""Base and top of the smoke above a cloud that is retrieved. [m]"""
 
 
 class Kind(NamedTuple):
@@ -53,6 +55,16 @@ KINDS = {
     "fire": Kind(
         ("C05", "C06", "C07"), fire(), (800.0, 1e-3), (1.0, 0.5), 1, "fire_emitted_power", True
     ),
+    # The same of cloud: thicknesses of 1 to 70, droplets of 4 to 22 um.
+    "cloud": Kind(
+        ("C02", "C06"),
+        liquid_cloud(),
+        (10.0, 10.0),
+        (1.5, 1.0),
+        0,
+        "cloud_optical_thickness",
+        True,
+    ),
 }
 """What the command retrieves, by name."""
 
@@ -70,11 +82,10 @@ class Pixels:
         rng = np.random.default_rng(seed)
         self.name, self.kind = name, KINDS[name]
         bands, vector = self.kind.bands, self.kind.vector
-        self.states = (
-            _hot_ground(rng, num_pixels, bands)
-            if name == "fire"
-            else random_states(rng, num_pixels, bands, name)
-        )
+        if name in _STATES:
+            self.states = _STATES[name](rng, num_pixels, bands)
+        else:
+            self.states = random_states(rng, num_pixels, bands, name)
         # Cloudy columns take as many doublings: the same program for all cases.
         self.forward = prepared(
             ForwardModel(vector, bands, streams, gases=()), with_cloud(self.states, 1.0)
@@ -86,11 +97,15 @@ class Pixels:
         self.noise = rng.standard_normal((num_pixels, len(bands)))
 
     def seen(
-        self, states: State | None = None, times: float = 1.0, imager: Imager = IMAGER
+        self,
+        states: State | None = None,
+        times: float = 1.0,
+        imager: Imager = IMAGER,
+        truth: np.ndarray | None = None,
     ) -> Observation:
         """What an imager reports, its noise so many times as large and known to be."""
-        bands = self.kind.bands
-        values = np.asarray(self.forward(self.truth, self.states if states is None else states))
+        bands, truth = self.kind.bands, self.truth if truth is None else truth
+        values = np.asarray(self.forward(truth, self.states if states is None else states))
         sigma = times * np.asarray(measurement(values, bands).sigma)
         seen = measurement(values + sigma * self.noise, bands, imager)
         return Observation(seen.measured, sigma, seen.saturated)
@@ -107,6 +122,27 @@ def _hot_ground(rng: np.random.Generator, num_pixels: int, bands: tuple[str, ...
         clear.geometry,
         temperature[:, -1] + 3,
         Fire(np.full(n, 0.01), np.full(n, 700.0)),
+    )
+
+
+def _cloudy(rng: np.random.Generator, num_pixels: int, bands: tuple[str, ...]) -> State:
+    """Random columns with a cloud, above which there could be smoke, and is none."""
+    clear = random_states(rng, num_pixels, bands)
+    return with_smoke_above(with_cloud(clear, 10.0), 0.0)
+
+
+_STATES = {"fire": _hot_ground, "cloud": _cloudy}
+
+
+def with_smoke_above(states: State, aod_550: float) -> State:
+    """The same columns with smoke from 7 to 9 km, of an optical depth at 550 nm. [-]"""
+    base, top = (np.full(len(states.geometry.solar_zenith), x) for x in SMOKE_ABOVE)
+    return eqx.tree_at(
+        lambda s: [
+            getattr(s.atmosphere.plumes["smoke"], x) for x in ("base", "top", "extinction_550")
+        ],
+        states,
+        [base, top, aod_550 / (top - base)],
     )
 
 

@@ -4,8 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from stress_retrievals import judged
 from stress_retrievals_cases import CASES
+from stress_retrievals_image import IMAGES, Image, judged_image
+from stress_retrievals_judged import judged
 from stress_retrievals_pixels import KINDS, Pixels
 
 from retrievals import Minimiser, ResultCode
@@ -15,7 +16,8 @@ ONE_START = Minimiser(starts="prior")  # and one program less to compile
 RESULTS_TOLD = {ResultCode.SUCCESS, ResultCode.NOT_OBSERVABLE}
 # Share of pixels that end; from the prior alone some fires do not, of which the shares are unknown
 # to a factor of 1,000.
-FROM_ONE_START = {"smoke": 1.0, "fire": 0.9}
+FROM_ONE_START = {"smoke": 1.0, "fire": 0.9, "cloud": 1.0}
+SLOW = pytest.mark.slow
 
 
 @cache
@@ -65,12 +67,12 @@ def test_bands_that_are_missing_make_less_observable_and_none_invalid():
     assert 0 < lost[0] < lost[1]
 
 
-@pytest.mark.parametrize("kind", ["smoke", "fire"])
+@pytest.mark.parametrize("kind", ["smoke", "fire", pytest.param("cloud", marks=SLOW)])
 def test_nothing_measured_is_no_input(kind):
     assert codes_of("all bands missing", kind).share(ResultCode.INVALID_INPUT) == 1
 
 
-@pytest.mark.parametrize("kind", ["smoke", "fire"])
+@pytest.mark.parametrize("kind", ["smoke", "fire", pytest.param("cloud", marks=SLOW)])
 def test_bounds_alone_are_no_poor_fit_and_no_success(kind):
     """What saturates in all bands is explained by anything that is bright enough."""
     found = codes_of("all bands saturated", kind)
@@ -120,6 +122,54 @@ def test_what_was_wrong_about_a_fires_pixel_is_a_poor_fit():
         ("cloud of 5, not known", 0.8),
     ):
         assert codes_of(name, "fire").share(ResultCode.POOR_FIT) > share, name
+
+
+@pytest.mark.slow
+def test_codes_of_cloud_are_true():
+    """Two unknowns of two bands: noise and other droplets are explained by other cloud."""
+    quiet, loud, thick = (
+        codes_of(name, "cloud")
+        for name in ("as the imager", "noise ten", "ten times thicker, known")
+    )
+    for found in (quiet, loud, thick):
+        assert set(found.codes) <= {ResultCode.SUCCESS, ResultCode.MULTIPLE_SOLUTIONS}
+        assert (np.abs(found.departures) <= 1.96).mean() > 0.8
+        assert found.finite.all()
+    # Sought among thin clouds, too: a success of 0.003 was 4, 134 sigma from there.
+    thin = judged(pixels("cloud"), "a hundred times thinner, known")
+    assert np.abs(thin.departures[thin.success]).max() < 10
+    assert codes_of("prior ten times too large and sure", "cloud").share(ResultCode.POOR_FIT) > 0.9
+    for name in ("albedo NaN", "no cloud water"):
+        holed = codes_of(name, "cloud")
+        assert set(holed.codes[::2]) == {ResultCode.NONFINITE}
+        np.testing.assert_array_equal(holed.codes[1::2], quiet.codes[1::2])
+
+
+@pytest.mark.slow
+def test_bad_pixels_of_an_image_spoil_none_beside_them():
+    image = Image(streams=2, side=12)
+    found = {name: judged_image(image, name, ONE_START) for name in IMAGES}
+    for name, one in found.items():
+        assert not one.judged.lost, name
+        bad = IMAGES[name](image).bad
+        assert ResultCode.NOT_CONVERGED not in one.judged.codes[~bad], name
+    clean = found["as the imager sees it"].judged
+    assert clean.share(ResultCode.SUCCESS) > 0.9 and (clean.coverage > 0.84).all()
+    for name, code in (
+        ("5 x 5 pixels missing", ResultCode.INVALID_INPUT),
+        ("5 x 5 pixels saturated", ResultCode.NOT_OBSERVABLE),
+        ("albedo NaN in two columns", ResultCode.NONFINITE),
+        ("one pixel's sigma 1e-160", ResultCode.NONFINITE),
+    ):
+        bad = IMAGES[name](image).bad
+        assert set(found[name].judged.codes[bad]) == {code}, name
+        assert found[name].success_beside > 0.9 and found[name].held_beside > 0.84, name
+    # What sticks out of a smooth image is not explained, and nor is what is drawn to it.
+    bright = found["one pixel as bright as a cloud, 0.9"]
+    assert (bright.judged.codes[bright.beside] == ResultCode.POOR_FIT).mean() > 0.5
+    assert bright.judged.share(ResultCode.SUCCESS) > 0.8
+    for name in ("the same, not told", "length ten times too large"):
+        assert found[name].judged.share(ResultCode.POOR_FIT) > 0.5, name
 
 
 def test_every_kind_has_cases():
