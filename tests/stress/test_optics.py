@@ -22,7 +22,7 @@ from abi_operator.optics import (
 )
 
 COUNT, LAYERS, NUM_MOMENTS = 6, 2, 7
-AMOUNT = powers(-12, 4, 1e-30, 1e6, 1.0)
+AMOUNT = powers(-12, 4, 1e-30, 9e5, 1.0)
 SHARE = among(0.0, 1.0)
 # The last numbers below 1 and above -1, in both precisions.
 NEARLY = float(np.nextafter(np.float32(1), np.float32(0)))
@@ -57,7 +57,7 @@ def columns(draw, band, species):
                 base + depth,
                 some(AMOUNT),
                 some(SHARE),
-                some(powers(-30, 30)) + 1e-30,
+                some(powers(-30, 5)) + 1e-30,
                 species,
             ),
         },
