@@ -26,7 +26,7 @@ from pathlib import Path
 import jax
 import numpy as np
 import stress_truth
-from stress_checks import AGREE, CHECKS, FLOOR, LIMITS, Judged, both, refused, value
+from stress_checks import AGREE, CHECKS, FLOOR, LIMITS, Judged, both, refused, scale_of, value
 from stress_code import state_of_code
 from stress_columns import GROUPS, SEED, columns_of
 from stress_directions import along, moved
@@ -179,7 +179,7 @@ def over_a_longer_step(group, index, row, precision):
 
     (_, light), slopes = both(columns, streams)
     light = np.asarray(light, np.float64)
-    least = np.maximum(asked.floor[row], FLOOR * abs(light))
+    floor = asked.floor[row]
     quotients = {
         "slope": (directions, at(directions, 1) - at(directions, -1)),
         "partial": (one, 4 * at(one, 1) - at(one, 2) - 3 * light),
@@ -188,7 +188,7 @@ def over_a_longer_step(group, index, row, precision):
     for name, (way, difference) in quotients.items():
         slope, sizes = along(slopes, way)
         apart = abs(difference / (2 * LONGER_STEP) - slope)
-        of = np.maximum(sizes, asked.floor[row] if name == "slope" else least)
+        of = np.maximum(sizes, floor) if name == "slope" else scale_of(sizes, light, floor)
         found[name] = float((apart / of)[0])
     return found
 

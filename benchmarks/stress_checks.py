@@ -83,6 +83,15 @@ def value(columns, **how):
     return np.asarray(solved(columns, **how), np.float64)
 
 
+def scale_of(size, light, floor):
+    """What errors of slopes in one number are relative to.
+
+    Where sun and view graze a reflectance may be 1e9, of which a quotient over a step of `STEP` has
+    rounding of a tenth: slopes are not asked for more than `FLOOR` of the reflectance.
+    """
+    return np.maximum(size, np.maximum(floor, FLOOR * abs(light)))
+
+
 def total(columns, num_streams):
     found = solved(columns, num_streams=num_streams)
     return jnp.sum(found), found
@@ -142,14 +151,6 @@ class Judged:
                 self.errors["energy"][self.beyond(np.ones_like(self.columns["ssa"]))] = np.nan
         return self.errors
 
-    def scale_of(self, size, rows=slice(None)):
-        """What errors of slopes in one number are relative to.
-
-        Where sun and view graze a reflectance may be 1e9, of which a quotient over a step of `STEP`
-        has rounding of a tenth: slopes are not asked for more than `FLOOR` of the reflectance.
-        """
-        return np.maximum(size, np.maximum(self.floor, FLOOR * abs(self.value))[rows])
-
     def beyond(self, ssa):
         """Columns with more conservative scattering than single precision is for."""
         tau = np.where(1 - ssa < CONSERVATIVE, self.columns["tau"], 0).sum(axis=1)
@@ -187,7 +188,8 @@ class Judged:
                 for step in (1, 2)
             )
             quotient = (4 * once - twice - 3 * self.value) / (2 * STEP)
-            self._errors("partial", abs(quotient - partial_slope) / self.scale_of(size))
+            of = scale_of(size, self.value, self.floor)
+            self._errors("partial", abs(quotient - partial_slope) / of)
         else:
             _, exact = both(double, self.streams)
             wide = {name: x.astype(np.float64) for name, x in directions.items()}
@@ -195,7 +197,8 @@ class Judged:
             self._errors("float32 slope", abs(reverse - right) / np.maximum(sizes, self.floor))
             right, size = along(exact, self.one)
             found = along(slopes, self.one)[0]
-            self._errors("float32 partial", abs(found - right) / self.scale_of(size))
+            of = scale_of(size, self.value, self.floor)
+            self._errors("float32 partial", abs(found - right) / of)
         if self.streams <= JIT_UP_TO:
             (_, inside), slopes = both_inside_jit(columns, self.streams)
             self._errors("inside jit", self._apart(np.asarray(inside, float), self.value))

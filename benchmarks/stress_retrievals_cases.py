@@ -187,6 +187,14 @@ def _without_prior(pixels: Pixels, case: Case) -> Stressed:
     return case(pixels)._replace(prior=None)
 
 
+OF_ALL: dict[str, Case] = {
+    "as the imager sees it": as_seen,
+    "noise ten times as large": partial(as_seen, times=10.0),
+    "the same, not told": untold_noise,
+    "prior ten times too large": partial(wrong_prior, narrower=1.0),
+    "prior ten times too large and sure": partial(wrong_prior, narrower=10.0),
+}
+
 CLOUDS: dict[str, Case] = {
     "cloud of 5, known": partial(_cloud, depth=5.0, known=True),
     "cloud of 0.3, not known": partial(_cloud, depth=0.3, known=False),
@@ -195,11 +203,7 @@ CLOUDS: dict[str, Case] = {
 }
 
 OF_PLUMES: dict[str, Case] = {
-    "as the imager sees it": as_seen,
-    "noise ten times as large": partial(as_seen, times=10.0),
-    "the same, not told": untold_noise,
-    "prior ten times too large": partial(wrong_prior, narrower=1.0),
-    "prior ten times too large and sure": partial(wrong_prior, narrower=10.0),
+    **OF_ALL,
     "C02 missing": lambda p: _without(p, 1),
     "C01 and C02 missing": lambda p: _without(p, 0, 1),
     "all bands missing": lambda p: _without(p, 0, 1, 2),
@@ -211,11 +215,7 @@ OF_PLUMES: dict[str, Case] = {
 }
 
 OF_FIRES: dict[str, Case] = {
-    "as the imager sees it": as_seen,
-    "noise ten times as large": partial(as_seen, times=10.0),
-    "the same, not told": untold_noise,
-    "prior ten times too large": partial(wrong_prior, narrower=1.0),
-    "prior ten times too large and sure": partial(wrong_prior, narrower=10.0),
+    **OF_ALL,
     "C05 missing": lambda p: _without(p, 0),
     "C05 and C06 missing": lambda p: _without(p, 0, 1),
     "C07 missing": lambda p: _without(p, 2),
@@ -238,11 +238,7 @@ OF_FIRES: dict[str, Case] = {
 }
 
 OF_CLOUDS: dict[str, Case] = {
-    "as the imager sees it": as_seen,
-    "noise ten times as large": partial(as_seen, times=10.0),
-    "the same, not told": untold_noise,
-    "prior ten times too large": partial(wrong_prior, narrower=1.0),
-    "prior ten times too large and sure": partial(wrong_prior, narrower=10.0),
+    **OF_ALL,
     "C02 missing": lambda p: _without(p, 0),
     "C06 missing": lambda p: _without(p, 1),
     "all bands missing": lambda p: _without(p, 0, 1),

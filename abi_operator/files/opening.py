@@ -1,9 +1,10 @@
 """Opening a NetCDF file in a thread of its own, which is not waited for endlessly.
 
-Within a file damaged just so (one of 1,800 damaged copies in `tests/stress`) the HDF5 library looks
-for a name for ever. Nothing stops it there but the end of the process, and until then xarray opens
-no other file: `open_netcdf` says so of each that is asked for. A process that ends in the usual way
-tears the library down under its search and crashes, its work done: the commands leave at once.
+Within a file damaged just so (one of 600 damaged copies of WRF's output in `tests/stress`, the
+485th) the HDF5 library looks for a name for ever. Nothing stops it there but the end of the
+process, and until then xarray opens no other file: `open_netcdf` says so of each that is asked for.
+A process that ends in the usual way tears the library down under its search and crashes, its work
+done: the commands leave at once.
 """
 
 import os

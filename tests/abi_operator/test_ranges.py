@@ -5,6 +5,7 @@ import pytest
 
 from abi_operator.files.plausible import PLAUSIBLE
 from abi_operator.ranges import FINITE, SOLVER, STATE, WEATHER, Range
+from abi_operator.solver import toa_brf
 
 TABLES = {"solver": SOLVER, "state": STATE, "weather": WEATHER}
 EVERY = [(table, name) for table, ranges in TABLES.items() for name in ranges]
@@ -50,3 +51,11 @@ def test_quantities_of_one_name_have_one_range():
         assert STATE[name].low <= WEATHER[name].low < WEATHER[name].high <= STATE[name].high
     for name in WEATHER.keys() & PLAUSIBLE.keys():
         assert WEATHER[name][:2] == PLAUSIBLE[name][:2]
+
+
+def test_the_deepest_layer_that_is_allowed_is_as_bright_as_a_deep_one():
+    """Seen and lit at a cosine of 1e-3, where rounding counts most."""
+    tau = np.array([1e8, 0.9 * SOLVER["tau"].high])[:, None] * np.array([0.0, 1.0]) + [0.1, 0.0]
+    given = {"tau": tau, "ssa": np.full(2, 0.9), "moments": 0.5 ** np.arange(3) * np.ones((2, 1))}
+    found = toa_brf(**given, albedo=0.3, mu0=1e-3, mu=1e-3, relative_azimuth=1.0, num_streams=2)
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6)

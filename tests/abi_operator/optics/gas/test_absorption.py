@@ -381,3 +381,23 @@ def test_a_layer_of_next_to_no_air_has_finite_slopes():
             lambda p, air=air: self_continuum_vapour(eqx.tree_at(lambda a: a.pressure, air, p))
         )(pressure)
         assert np.isfinite(slopes).all()
+
+
+@pytest.mark.parametrize("inside", [jax.jit, lambda x: x], ids=["jit", "plain"])
+def test_levels_at_one_pressure_have_nothing_between_them(inside):
+    """Under much methane, where a joined product and difference had -2e-11; with the slope of a
+    layer that opens downwards."""
+    air = standard_atmosphere("us_standard")
+    air = eqx.tree_at(lambda a: a.gases.methane, air, jnp.ones_like(air.gases.methane))
+    pressures = jnp.asarray(air.pressure).at[-1].set(air.pressure[-2])
+    columns = jnp.stack([jnp.zeros_like(pressures), pressures, pressures])
+
+    def lowest(pressure):
+        given = eqx.tree_at(lambda a: a.pressure, air, pressure)
+        return gas_absorption(given, BANDS["C06"], ("CH4", "CO2")).extinction[:, -1]
+
+    tau = np.asarray(inside(jax.vmap(lowest))(columns))
+    np.testing.assert_array_equal(tau, 0)
+    downwards = jnp.zeros_like(pressures).at[-1].set(1.0)
+    _, slope = jax.jvp(lowest, (pressures,), (downwards,))
+    assert (np.asarray(slope) > 0).all()
