@@ -14,7 +14,8 @@ forward model (tolerance 1e-5, no coarse steps, nothing left out).
   chunks; the rest is the optimiser, waiting for the slowest pixel of a chunk included.
 - CDISORT: nanodisort at as many streams with 129 moments in one process a core, Jacobians by
   differences, steps of Gauss and Newton, shortened where the cost rises, that end as ours do;
-  pixels leave as they converge. Optics are this project's.
+  pixels leave as they converge. Optics are this project's. Ours are on its nodes too
+  (`solver.on_double_gauss`), so that both have the same minimum.
 - cold: a process of its own with an empty folder of compiled programs, from its start to the first
   `--first-pixels` solutions.
 
@@ -40,6 +41,7 @@ from workload import near_node
 
 from abi_operator.band_columns import columns_of_bands
 from abi_operator.machine.speed import usable_cores, use_compilation_cache, use_compiler_flags
+from abi_operator.solver import on_double_gauss
 from retrievals import Minimiser, measurement, prepared, retrieve_pixels
 from retrievals.chunks import map_chunks
 from retrievals.coarse_to_fine import coarse, minimise_coarsely
@@ -233,6 +235,12 @@ def main():
     if given.first:
         first(given)
         return
+    with on_double_gauss():
+        side_by_side(given)
+
+
+def side_by_side(given):
+    """The table, and where the time goes."""
     whole, observation, states, prior, _ = with_prior(given.pixels, given.streams, NAMES)
     forward = replace(whole, error_budget=BUDGET)
     retrieve = partial(retrieve_pixels, observations=observation, states=states, prior=prior)

@@ -4,8 +4,10 @@
 
 times the value (`toa_brf`), the value with its gradient in every argument, and every other solver
 that is installed (extra `benchmark`), in rounds in which each has its turn on columns that no round
-before had. Beside the time stands the error of those very calls. `--sweep` (see --help) measures
-against batch, layers, streams or precision, memory and compiling, Jacobians and `jax.vmap`.
+before had. Beside the time stands the error of those very calls. All solve on the nodes of double
+Gauss, which others have, so that they agree to rounding; times are the same on our own. `--sweep`
+(see --help) measures against batch, layers, streams or precision, memory and compiling, Jacobians
+and `jax.vmap`.
 `--plain` times a user's script without any setting instead, beside a process tuned by hand.
 `--check` judges all that was measured and exits with 1 where a bar is missed.
 """
@@ -25,7 +27,7 @@ from rounds import AGREE, Bars, Program, Rounds, apart, digits, relative, table
 
 from abi_operator import __version__
 from abi_operator.machine.speed import usable_cores
-from abi_operator.solver import double_gauss
+from abi_operator.solver import double_gauss, on_double_gauss
 
 TRUE_STREAMS = 64
 PEER_SHARE = 0.8  # of its earlier rate relative to nanodisort's, or the comparison is unfair
@@ -210,7 +212,10 @@ def main():
         bars.judge(text != "MISSING", f"{name} is not installed")
     if found["nanodisort"] == "MISSING":
         sys.exit('The reference is missing: pip install "abi-operator[benchmark]".')
-    with Peers(cores, max(options.columns, 16), max(60, options.layers)) as peers:
+    with (
+        Peers(cores, max(options.columns, 16), max(60, options.layers)) as peers,
+        on_double_gauss(),
+    ):
         rounds = Rounds(peers, options.repeats, options.seconds)
         if options.plain:
             plain.plain(peers, options, bars)

@@ -16,7 +16,7 @@ from abi_operator.optics.mie_phase import MiePhase
 from abi_operator.planck import in_band_radiance
 from abi_operator.ranges import SOLVER
 from abi_operator.satellites import solar_irradiance
-from abi_operator.solver import double_gauss
+from abi_operator.solver import half_range
 
 SEED = 20261125
 # Streams, layers at most and at least, whether they emit, columns of a batch, share of all columns.
@@ -186,7 +186,7 @@ def _angles(rng, mode, num_streams):
     grazing = np.where(rng.random((2, count)) < 0.3, LOWEST, 10 ** rng.uniform(-3, -1, (2, count)))
     mu0 = np.where(low & (which != 1), grazing[0], mu0)
     mu = np.where(low & (which != 0), grazing[1], mu)
-    nodes = double_gauss(num_streams)[0]
+    nodes = half_range(num_streams)[0]
     at = mode == "nodes"
     mu0 = np.where(at & (which != 1), beside * rng.choice(nodes, count), mu0)
     mu = np.where(at & (which != 0), beside * rng.choice(nodes, count), mu)

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from abi_operator.solver import half_range
+
 
 def simple_columns(count=4, num_layers=5, num_moments=33, seed=3):
     """Hazy layers over grey ground: arguments of `toa_brf`, batch first, nothing extreme."""
@@ -55,7 +57,7 @@ def hard_columns(num_moments=33, num_streams=8):
     ssa[at["ssa 0"]] = 0
     ssa[at["ssa 1"]] = 1
     mu0[at["mu0 = mu"]] = mu[at["mu0 = mu"]]
-    nodes = (np.polynomial.legendre.leggauss(num_streams // 2)[0] + 1) / 2
+    nodes = half_range(num_streams)[0]
     mu0[at["mu0 at a node"]], mu[at["mu0 at a node"]] = nodes[(nodes.size - 1) // 2], nodes[-1]
     mu0[at["exact backscatter"]] = mu[at["exact backscatter"]]
     azimuth[at["exact backscatter"]] = 0

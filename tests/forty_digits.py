@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from flint import arb, arb_mat, ctx
 from forty_digit_layers import EXPONENT, identity, layer_emission, scattering
+from forty_digit_nodes import gauss, leaning
 
 # 77 digits, of which exponentials, recursions and the pessimism of balls take 10 to 25.
 BITS = 256
@@ -207,24 +208,26 @@ def forty_digit_radiance(
     secant=None,
     delta_m=True,
     phase_function=None,
+    on_double_gauss=False,
 ):
     """Radiance at the top of one column in the units of its sources.
 
     `moments` has axes ``layer moment``; `mu` and `relative_azimuth` are numbers or lists of views.
     `albedo` is a number or a `Ground`, `secant` replaces 1/mu0 in each layer's attenuation of the
     sun, and `corrected` adds the exact single scattering, of one view that of `phase_function`
-    where it is given. Numbers enter as float64, exactly.
+    where it is given. Nodes are the solver's, or CDISORT's with `on_double_gauss`. Numbers enter as
+    float64, exactly.
     """
     before, ctx.prec = ctx.prec, BITS
     try:
         count = num_streams // 2
-        pairs = [arb.legendre_p_root(count, k, weight=True) for k in range(count)]
+        pairs = (gauss if on_double_gauss else leaning)(count)
         sun = arb(float(mu0))
         views = [arb(float(x)) for x in np.atleast_1d(mu)]
         azimuths = [arb(float(x)) for x in np.atleast_1d(relative_azimuth)]
         directions = _Directions(
-            [*((x + 1) / 2 for x, _ in pairs), sun, *views],
-            [*(w / 2 for _, w in pairs), arb(1), *[arb(0)] * len(views)],
+            [*(x for x, _ in pairs), sun, *views],
+            [*(w for _, w in pairs), arb(1), *[arb(0)] * len(views)],
             count,
         )
         shines = planck_levels is not None or surface_emission != 0
@@ -262,8 +265,19 @@ def forty_digit_radiance(
         ctx.prec = before
 
 
-def forty_digit_brf(tau, ssa, moments, albedo, mu0, mu, relative_azimuth, num_streams, corrected):
-    """Bidirectional reflectance factor; arguments as `cdisort.cdisort_brf`."""
+def forty_digit_brf(
+    tau,
+    ssa,
+    moments,
+    albedo,
+    mu0,
+    mu,
+    relative_azimuth,
+    num_streams,
+    corrected,
+    on_double_gauss=False,
+):
+    """Bidirectional reflectance factor; arguments as `cdisort.cdisort_brf`, and whose nodes."""
     radiance = forty_digit_radiance(
         tau,
         ssa,
@@ -275,5 +289,6 @@ def forty_digit_brf(tau, ssa, moments, albedo, mu0, mu, relative_azimuth, num_st
         num_streams,
         corrected,
         solar_irradiance=1.0,
+        on_double_gauss=on_double_gauss,
     )
     return np.pi * radiance / mu0

@@ -1,4 +1,4 @@
-"""Every published case in one call of the solver a number of streams: compiling is what costs."""
+"""Published cases in one call of the solver a number of streams: compiling is what costs."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,7 +15,7 @@ from disort_suite import (
     suite_problem,
 )
 
-from abi_operator.solver import toa_albedo, toa_radiance
+from abi_operator.solver import double_gauss, on_double_gauss, toa_albedo, toa_radiance
 
 MAX_LAYERS = 6
 # Thicker layers come as several, for which few doublings are enough: a program with more of them
@@ -51,12 +51,6 @@ class View:
         levels = np.array([cdisort_planck(t, p.wavenumber) for t in p.temperature])
         ground = (1 - p.albedo) * cdisort_planck(p.bottom_temperature, p.wavenumber)
         return levels, ground, p.isotropic_top + cdisort_planck(p.top_temperature, p.wavenumber)
-
-
-def half_range_nodes(num_streams):
-    """Nodes and weights of Gauss on 0 to 1."""
-    nodes, weights = np.polynomial.legendre.leggauss(num_streams // 2)
-    return (nodes + 1) / 2, weights / 2
 
 
 def in_parts(problem, levels):
@@ -120,28 +114,36 @@ def glows(problem):
     return problem.isotropic_top > 0 or problem.temperature is not None
 
 
-def _views(num_streams):
-    def suite(row, degree=None):
-        return View(problems(degree)[row["case"]], float(row["mu"]), float(row["azimuth_deg"]))
+def _from_suite(row, degree=None):
+    return View(problems(degree)[row["case"]], float(row["mu"]), float(row["azimuth_deg"]))
 
+
+def _views_on_double_gauss(num_streams):
+    """What other solvers have at the same streams."""
     # The flux without the sun: radiances at the nodes. TMS does nothing there.
     dark = [
         View(replace(problems()[row["case"]], solar_irradiance=0.0), mu)
         for row in suite_rows("disort_fluxes.csv", num_streams)
         if glows(problems()[row["case"]])
-        for mu in half_range_nodes(num_streams)[0]
+        for mu in double_gauss(num_streams)[0]
     ]
     views = {
-        "suite": [suite(r) for r in suite_rows("disort_radiances.csv", num_streams)],
+        "suite": [_from_suite(r) for r in suite_rows("disort_radiances.csv", num_streams)],
         "dark": dark,
     }
-    if num_streams in PLUME_STREAMS:
-        views["plumes"] = _seen(plumes.columns())
     if num_streams in RANDOM_STREAMS:
         views["random"] = random_views(num_streams)
+    return views
+
+
+def _views(num_streams):
+    """What is known whatever the streams."""
+    views = {}
+    if num_streams in PLUME_STREAMS:
+        views["plumes"] = _seen(plumes.columns())
     if num_streams in (16, 32, 64):
         views |= {
-            "converged": [suite(r, FULL_DEGREE) for r in suite_rows("disort_radiances.csv")],
+            "converged": [_from_suite(r, FULL_DEGREE) for r in suite_rows("disort_radiances.csv")],
             "garcia_siewert": _garcia_siewert(),
             "van_de_hulst": [
                 View(_van_de_hulst(r), float(r["mu"]))
@@ -234,10 +236,7 @@ def _isothermal(count=60, planck=1.7):
     return views
 
 
-@cache
-def radiances(num_streams):
-    """Radiance of every view at so many streams, by group."""
-    views = _views(num_streams)
+def _radiances(views, num_streams):
     arguments, sources = solver_arguments([view for group in views.values() for view in group])
     result = np.asarray(toa_radiance(*arguments, **sources, num_streams=num_streams))
     ends = np.cumsum([len(group) for group in views.values()])
@@ -245,23 +244,42 @@ def radiances(num_streams):
 
 
 @cache
-def plane_albedos(num_streams):
-    """Plane albedo at so many streams, by group: the suite's own, converged, thick, tabulated."""
-    groups = {
-        "suite": [problems()[r["case"]] for r in suite_rows("disort_fluxes.csv", num_streams)]
-    }
-    if num_streams in (16, 32, 64):
-        groups |= {
-            "converged": [
-                problems(FULL_DEGREE)[r["case"]] for r in suite_rows("disort_fluxes.csv")
-            ],
-            "van_de_hulst": [
-                _van_de_hulst(r) for r in read_table("van_de_hulst.csv") if r["mu"] == "flux"
-            ],
-            "semi_infinite": semi_infinite(),
-        }
+def radiances(num_streams):
+    """Radiance of views whose radiance is known, at so many streams, by group."""
+    return _radiances(_views(num_streams), num_streams)
+
+
+@cache
+def radiances_on_double_gauss(num_streams):
+    """Radiance of every view that others have at so many streams, by group."""
+    with on_double_gauss():
+        return _radiances(_views_on_double_gauss(num_streams), num_streams)
+
+
+def _plane_albedos(groups, num_streams):
     views = [View(p, 0.5) for group in groups.values() for p in group]
     (tau, ssa, moments, albedo, mu0, *_), _ = solver_arguments(views)
     result = np.asarray(toa_albedo(tau, ssa, moments, albedo, mu0, num_streams=num_streams))
     ends = np.cumsum([len(group) for group in groups.values()])
     return dict(zip(groups, np.split(result, ends[:-1]), strict=True))
+
+
+@cache
+def plane_albedos(num_streams):
+    """Plane albedo at so many streams, by group: converged, tabulated, thick."""
+    groups = {
+        "converged": [problems(FULL_DEGREE)[r["case"]] for r in suite_rows("disort_fluxes.csv")],
+        "van_de_hulst": [
+            _van_de_hulst(r) for r in read_table("van_de_hulst.csv") if r["mu"] == "flux"
+        ],
+        "semi_infinite": semi_infinite(),
+    }
+    return _plane_albedos(groups, num_streams)
+
+
+@cache
+def plane_albedos_on_double_gauss(num_streams):
+    """Plane albedo of the suite's problems at their own streams."""
+    suite = [problems()[r["case"]] for r in suite_rows("disort_fluxes.csv", num_streams)]
+    with on_double_gauss():
+        return _plane_albedos({"suite": suite}, num_streams)["suite"]

@@ -16,9 +16,9 @@ or ice, or what falls from it."""
 STREAMS = (8, 10, 12, 16, 24)
 """Numbers of streams to choose from. [-]"""
 ERRORS = {
-    "air": (4.7e-3, 2.2e-3, 1.5e-3, 6.9e-4, 9.4e-5),
-    "plume": (7.0e-3, 3.4e-3, 1.5e-3, 6.1e-4, 1.5e-4),
-    "cloud": (8.8e-3, 6.2e-3, 5.9e-3, 4.4e-3, 3.5e-3),
+    "air": (2.3e-3, 1.3e-3, 7.8e-4, 2.8e-4, 4.8e-5),
+    "plume": (6.7e-3, 2.9e-3, 1.2e-3, 5.4e-4, 1.8e-4),
+    "cloud": (9.5e-3, 6.5e-3, 6.1e-3, 4.9e-3, 4.1e-3),
 }
 """By kind, what so many `STREAMS` leave of the error in 99 of 100 columns. [-]"""
 

@@ -14,6 +14,8 @@ from .albedo import surface_coupling as surface_coupling
 from .albedo import toa_albedo as toa_albedo
 from .method.doublings import sufficient_doublings as sufficient_doublings
 from .method.quadrature import double_gauss as double_gauss
+from .method.quadrature import half_range as half_range
+from .method.quadrature import on_double_gauss as on_double_gauss
 from .method.single_scatter import cos_scattering_angle as cos_scattering_angle
 from .method.slant_path import slant_path_secant as slant_path_secant
 from .method.surface import AnySurface as AnySurface

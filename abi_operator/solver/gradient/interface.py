@@ -26,7 +26,7 @@ from ...machine.algebra import fenced, product, total
 from ..method.bordered import Bordered
 from ..method.layer import ModeKernels
 from ..method.mode_layers import Order
-from ..method.quadrature import double_gauss
+from ..method.quadrature import half_range
 from .fields import Fields, swapped
 from .pull_back import on_nodes
 
@@ -88,7 +88,7 @@ def _of_diffuse(seen, beams, own):
 
 def _without_diagonal(slopes, nodes, fields):
     """The mean's slopes: its diagonal is formed from the other entries of its row."""
-    mu, weight = double_gauss(2 * nodes.shape[0])
+    mu, weight = half_range(2 * nodes.shape[0])
     s = np.sqrt(weight * mu).tolist()
 
     @fenced
@@ -106,7 +106,7 @@ def _same(slopes, nodes, fields):
 
 
 def _rows(fields: Fields, behind: Fields, view_secant, a, b, order: Order):
-    mu, _ = double_gauss(2 * fields.nodes.shape[0])
+    mu, _ = half_range(2 * fields.nodes.shape[0])
     inverse_mu = (1 / mu).tolist()
 
     @fenced

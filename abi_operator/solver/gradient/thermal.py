@@ -41,7 +41,7 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, kernel_of_product, matmul, product, total
 from ..method.bordered import Bordered, Vector
-from ..method.quadrature import double_gauss
+from ..method.quadrature import half_range
 from ..method.quotient import Quotient
 from .fields import Fields, Heat, pair
 
@@ -123,7 +123,7 @@ def _on_isotropic(border, diagonal, root):
 
 def isotropic_nodes(like: Float[Array, "node _ *batch"]) -> Float[Array, "node 1 *#batch"]:
     """Nodes of the vector 1."""
-    mu, weight = double_gauss(2 * like.shape[0])
+    mu, weight = half_range(2 * like.shape[0])
     root = np.sqrt(weight * mu).reshape(-1, *(1,) * (like.ndim - 1))
     return jnp.asarray(root, like.dtype)
 

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .quadrature import double_gauss
+from .quadrature import half_range
 
 # Largest z = tau' / (2 mu_min) of a layer for which the start of `layer.half_layer`, doubled
 # 0, 1, 2, 3, 4 times, errs by 1e-12 or less; four times as much for each doubling after that.
@@ -177,7 +177,7 @@ def within_reach(
 def _half_thickness(tau: Array, secants: Array, num_streams: int) -> Array:
     """Optical depth of half a layer on the steepest path through it, without a derivative."""
     tau, secants = jax.lax.stop_gradient((tau, secants))
-    steepest = jnp.maximum(jnp.max(secants, axis=0), 1 / double_gauss(num_streams)[0][0].item())
+    steepest = jnp.maximum(jnp.max(secants, axis=0), 1 / half_range(num_streams)[0][0].item())
     return 0.5 * tau * steepest
 
 
@@ -208,7 +208,7 @@ def sufficient_doublings(
     dtype
         Precision in which they are solved: single precision needs more for thick ones.
     """
-    z = max_tau / (2 * min(min_mu, double_gauss(num_streams)[0][0]))
+    z = max_tau / (2 * min(min_mu, half_range(num_streams)[0][0]))
     single = np.dtype(dtype) == np.float32
     further = range(_BUCKETS[-1], _MOST)
     enough = (k for k in (*_BUCKETS, *further) if z <= _reach(k, single=single))

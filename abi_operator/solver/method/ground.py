@@ -5,13 +5,13 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .bordered import Bordered, Vector
-from .quadrature import double_gauss
+from .quadrature import half_range
 from .surface import AnySurface
 
 
 def isotropic(num_streams: int, beams: Float[Array, "beam *batch"]) -> Vector:
     r"""Radiance 1 in all directions: :math:`\sqrt{w\mu}` at the nodes, 1 at the beams."""
-    mu, weight = double_gauss(num_streams)
+    mu, weight = half_range(num_streams)
     shape = (mu.size,) + (1,) * (beams.ndim - 1)
     nodes = jnp.asarray(np.sqrt(weight * mu), beams.dtype).reshape(shape)
     return Vector(jnp.broadcast_to(nodes, (mu.size, *beams.shape[1:])), jnp.ones_like(beams))
@@ -54,7 +54,7 @@ def reflecting(
     (`single_scatter.direct_transmission`).
     """
     r = isotropic(num_streams, beams)
-    nodes = jnp.asarray(double_gauss(num_streams)[0], beams.dtype)
+    nodes = jnp.asarray(half_range(num_streams)[0], beams.dtype)
     nodes = jnp.broadcast_to(nodes.reshape(-1, *(1,) * (beams.ndim - 1)), r.nodes.shape)
     sign = jnp.where(jnp.asarray(m) % 2 == 0, 1, -1).astype(beams.dtype)
     among_nodes = sign * surface.modes(m, nodes[:, None], nodes[None])

@@ -30,7 +30,7 @@ from ...machine.algebra import matmul, total, weighted_sum
 from .bordered import Bordered, combined
 from .doublings import Doublings, repeated
 from .legendre import associated_legendre
-from .quadrature import double_gauss
+from .quadrature import half_range
 from .quotient import minus_quotient
 
 
@@ -57,7 +57,7 @@ class ModeKernels(eqx.Module):
 
 def node_functions(num_streams: int, num_modes: int) -> np.ndarray:
     """Legendre functions of the nodes times sqrt(w / mu), axes ``mode degree node``, float64."""
-    mu, weight = double_gauss(num_streams)
+    mu, weight = half_range(num_streams)
     return np.asarray(associated_legendre(num_modes, num_streams, mu)) * np.sqrt(weight / mu)
 
 
@@ -82,7 +82,7 @@ def layer_matrix(
         Whether sun -> view is scattered here; False where single scattering is added exactly.
     """
     num_nodes = kernels.nodes.shape[0]
-    mu = jnp.asarray(double_gauss(2 * num_nodes)[0], moments.dtype)
+    mu = jnp.asarray(half_range(2 * num_nodes)[0], moments.dtype)
     minus = -moments
     core = weighted_sum(kernels.pairs, minus, jnp.diag(1 / mu))
     weighted = jnp.swapaxes(minus * kernels.beams, 0, 1)
@@ -102,7 +102,7 @@ def conservative(matrix: Bordered, coalbedo: Float[Array, "*batch"]) -> Bordered
     minus the other entries keeps a co-albedo far below the rounding error of 1 - ssa P.
     """
     num_nodes = matrix.core.shape[0]
-    mu, weight = double_gauss(2 * num_nodes)
+    mu, weight = half_range(2 * num_nodes)
     expand = (num_nodes,) + (1,) * coalbedo.ndim
     s = jnp.asarray(np.sqrt(weight * mu), coalbedo.dtype).reshape(expand)
     diagonal = jnp.eye(num_nodes, dtype=bool).reshape(*expand[:1], *expand)

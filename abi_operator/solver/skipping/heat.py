@@ -22,7 +22,7 @@ from jaxtyping import Array, Float
 from ...machine.algebra import total
 from ...machine.kernels import one_kernel
 from ..method.mode_layers import read
-from ..method.quadrature import double_gauss
+from ..method.quadrature import half_range
 from .budget import Expected
 from .grouping import Groups
 
@@ -87,7 +87,7 @@ def unscattered(
         Of layers, from the top; None for all.
     """
     layers = tau, coalbedo, planck, jumps
-    mu, weight = double_gauss(num_streams)
+    mu, weight = half_range(num_streams)
     nodes = mu.reshape(-1, *(1,) * secant.ndim), 2 * mu * weight
 
     def of_these(layers: Any, secant: Array, *number: Array) -> Unscattered:

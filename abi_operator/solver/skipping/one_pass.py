@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import total
 from ..method.mode_layers import read
-from ..method.quadrature import double_gauss
+from ..method.quadrature import half_range
 from ..method.single_scatter import extinguished
 from .depths import Depths
 from .heat import emissivities
@@ -216,7 +216,7 @@ def _warmer(heat, lost, turns, planck, secant):
     """The same with one more layer on it, which emits as much as beams lose in it."""
     above, below = planck
     jump = below - above
-    mu, weight = double_gauss(2 * len(heat.rising))
+    mu, weight = half_range(2 * len(heat.rising))
     through, own, rest = emissivities(secant * lost)
     from_below = total([w * x for w, x in zip(weight.tolist(), heat.rising, strict=True)])
     turned = through * heat.turned + secant * turns * (from_below + above + jnp.abs(jump))
@@ -234,6 +234,6 @@ def _warmer(heat, lost, turns, planck, secant):
 
 
 def _passing(heat):
-    mu, weight = double_gauss(2 * len(heat.falling))
+    mu, weight = half_range(2 * len(heat.falling))
     down = total([w * x for w, x in zip((2 * mu * weight).tolist(), heat.falling, strict=True)])
     return Passing(heat.up, down, heat.turned, heat.hottest)

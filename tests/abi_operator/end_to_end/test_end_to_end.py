@@ -29,6 +29,7 @@ from abi_operator import brf, radiance
 from abi_operator.bands import BANDS as ABI_BANDS
 from abi_operator.optics import column_optics
 from abi_operator.optics.mie_table import mie_table
+from abi_operator.solver import on_double_gauss
 
 SEED = 20050828
 FEW, MANY = 4, 26  # columns of each kind
@@ -43,6 +44,12 @@ EQUAL = 1e-6
 # any other spheres differ by more.)
 MIE_TABLES = 1e-4
 EMITTING = ("C05", "C06", "C07")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nodes_of_cdisort():
+    with on_double_gauss():
+        yield
 
 
 @pytest.fixture(scope="module", params=[FEW, pytest.param(MANY, marks=pytest.mark.slow)])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from columns import STANDARD, standard_columns
 
-from abi_operator.solver import double_gauss, surface_coupling, toa_albedo, toa_brf
+from abi_operator.solver import half_range, surface_coupling, toa_albedo, toa_brf
 
 CLOSED_FORM = 1e-12  # the same solve, summed in another order
 
@@ -40,7 +40,7 @@ def test_the_closed_form_for_several_views_and_under_a_slanting_sun():
 def test_plane_albedo_is_the_mean_reflectance():
     r""":math:`2\sum_i w_i\mu_i BRF_0(\mu_i)` over the streams, mode 0, without the correction."""
     tau, ssa, moments, albedo, mu0, *_ = (x[:, None, None] for x in standard_columns(16))
-    mu, weight = double_gauss(4)
+    mu, weight = half_range(4)
     # The mean over so many azimuths is the mode of order 0.
     azimuths = 2 * np.pi * np.arange(4) / 4
     every = toa_brf(
@@ -74,7 +74,7 @@ def test_conservative_air_sends_light_up_or_down():
     """With ssa = 1 the spherical albedo from below and the mean transmission add up to 1."""
     tau, ssa, moments, _, mu0, mu, azimuth = standard_columns(16)
     white = np.ones_like(ssa)
-    nodes, weight = double_gauss(4)
+    nodes, weight = half_range(4)
     shape = (16, nodes.size)
     views = np.broadcast_to(nodes, shape)
     options = STANDARD | {"multiple_views": True, "secant": 1 / mu0[:, None] * np.ones_like(tau)}

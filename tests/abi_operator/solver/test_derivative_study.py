@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from random_columns import random_columns
 
-from abi_operator.solver import double_gauss, sufficient_doublings, toa_brf
+from abi_operator.solver import half_range, sufficient_doublings, toa_brf
 
 INPUTS = ("tau", "ssa", "moments", "albedo", "mu0", "mu", "relative_azimuth")
 SEED = 19860328
@@ -51,7 +51,7 @@ def first_steps(columns, num_streams):
     tau, ssa, moments, albedo, mu0, mu, _ = columns
     transport = np.sum(tau * (1 - moments[..., 1]), axis=1)
     absorption = np.sum(tau * (1 - ssa), axis=1)
-    steepest = np.minimum(np.minimum(mu0, mu), double_gauss(num_streams)[0][0])
+    steepest = np.minimum(np.minimum(mu0, mu), half_range(num_streams)[0][0])
     return {
         "tau": 0.3 * steepest,
         # A conservative layer of this depth has its nearest pole at ssa - 1 of about 1 / depth^2.

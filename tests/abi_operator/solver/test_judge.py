@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from abi_operator.solver import (
     Lambertian,
     Surface,
-    double_gauss,
+    half_range,
     surface_coupling,
     toa_albedo,
     toa_brf,
@@ -104,7 +104,7 @@ def columns():
 def views():
     """Four views of each column: nadir, the sun's own direction, a node, a grazing one."""
     mu0, mu = columns()[4:6]
-    nodes, _ = double_gauss(NUM_STREAMS)
+    nodes, _ = half_range(NUM_STREAMS)
     many = np.stack([np.ones(COUNT), mu0, np.full(COUNT, nodes[1]), 0.1 * mu], axis=-1)
     return many, np.array([0.3, 0.0, np.pi, 2.0]) * np.ones((COUNT, 1))
 
@@ -289,7 +289,7 @@ def test_sunlight_and_thermal_light_over_vegetation():
 def test_plane_albedo_is_the_reflectance_over_all_directions(ground):
     """At nodes and as many equal azimuths as streams, the sum over directions is exact."""
     num_streams = NUM_STREAMS
-    nodes, weights = double_gauss(num_streams)
+    nodes, weights = half_range(num_streams)
     azimuths = 2 * np.pi * np.arange(num_streams) / num_streams
     mu, azimuth = (x.ravel() for x in np.meshgrid(nodes, azimuths, indexing="ij"))
     tau, ssa, moments, albedo, mu0, *_ = columns()
