@@ -19,9 +19,13 @@ def leaning(count: int) -> list[tuple[arb, arb]]:
     """
     if count == 1:
         return gauss(1)
-    a = 1 - 1 / (0.30574 * count + 0.5015 + 0.0613 / count)
-    series = np.append(np.zeros(count - 1), [a, 1])
-    return [_polished(x, arb(a), count) for x in np.polynomial.legendre.legroots(series).real]
+    return quasi_gauss(count, arb(1 - 1 / (0.30574 * count + 0.5015 + 0.0613 / count)))
+
+
+def quasi_gauss(count: int, a: arb) -> list[tuple[arb, arb]]:
+    """The same for any a between -1 and 1."""
+    series = np.append(np.zeros(count - 1), [float(a), 1])
+    return [_polished(x, a, count) for x in np.polynomial.legendre.legroots(series).real]
 
 
 def _polished(start: float, a: arb, count: int) -> tuple[arb, arb]:
