@@ -265,30 +265,8 @@ def forty_digit_radiance(
         ctx.prec = before
 
 
-def forty_digit_brf(
-    tau,
-    ssa,
-    moments,
-    albedo,
-    mu0,
-    mu,
-    relative_azimuth,
-    num_streams,
-    corrected,
-    on_double_gauss=False,
-):
+def forty_digit_brf(*column, on_double_gauss=False):
     """Bidirectional reflectance factor; arguments as `cdisort.cdisort_brf`, and whose nodes."""
-    radiance = forty_digit_radiance(
-        tau,
-        ssa,
-        moments,
-        albedo,
-        mu0,
-        mu,
-        relative_azimuth,
-        num_streams,
-        corrected,
-        solar_irradiance=1.0,
-        on_double_gauss=on_double_gauss,
-    )
-    return np.pi * radiance / mu0
+    how = {"solar_irradiance": 1.0, "on_double_gauss": on_double_gauss}
+    mu0 = column[4]
+    return np.pi * forty_digit_radiance(*column, **how) / mu0

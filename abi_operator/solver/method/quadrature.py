@@ -15,11 +15,9 @@ that is exact for :math:`\mu^2\log\mu` lies between, at
 :math:`1/(1 - a) = 0.30574n + 0.5015 + 0.0613/n`, a fit that leaves at most 6e-4 of Gauss's
 error for that function (`benchmarks/fit_quadrature.py`).
 
-Errors of reflectances are halved in clear air at equal streams, and as large as with Gauss's nodes
-in clouds, whose sharp phase functions ask for other things (`benchmarks/quadrature.py`). Of other
-functions in its place (:math:`\mu\log\mu`, half-odd powers), of two of them at the price of one
-more odd power, of Gauss's rule in a power of mu, and of Jacobi's weights none is better in all
-kinds of columns.
+At equal streams reflectances of clear air are twice as near the truth as on Gauss's nodes, and
+those of clouds, whose sharp phase functions ask for other things, up to a sixth further off
+(`benchmarks/fit_streams.py` and its ``--double-gauss``; `benchmarks/quadrature.py`).
 
 References
 ----------

@@ -125,7 +125,7 @@ def compare(count: int, corrected: bool, streams: tuple[int, ...]) -> Comparison
             column = [tau[i][used], *(x[i][used] for x in rest[:2]), *(x[i] for x in rest[2:])]
             name = f"{num_streams}/{i}"
             if thin[i]:
-                exact = forty_digit_brf(*column, num_streams, corrected, True)
+                exact = forty_digit_brf(*column, num_streams, corrected, on_double_gauss=True)
                 result.ours_from_exact.append(error(ours[i], exact))
                 result.thin.append(f"{name} total tau {tau[i].sum():.1e}")
                 continue
@@ -136,7 +136,7 @@ def compare(count: int, corrected: bool, streams: tuple[int, ...]) -> Comparison
                 continue
             difference = error(ours[i], reference)
             if difference > EQUIVALENCE:
-                exact = forty_digit_brf(*column, num_streams, corrected, True)
+                exact = forty_digit_brf(*column, num_streams, corrected, on_double_gauss=True)
                 result.ours_from_exact.append(error(ours[i], exact))
                 line = (
                     f"{name} apart {difference:.1e}, ours {error(ours[i], exact):.1e}, CDISORT "
@@ -159,7 +159,7 @@ def why(column, num_streams: int, corrected: bool) -> str:
     if 0 < 1 - mu < VERTICAL:
         return JUDGED[1]
     moved = tau, np.minimum(ssa, 1 - CONSERVATIVE), moments, albedo, mu0, mu, azimuth
-    exact = forty_digit_brf(*moved, num_streams, corrected, True)
+    exact = forty_digit_brf(*moved, num_streams, corrected, on_double_gauss=True)
     found = error(cdisort_brf(*moved, num_streams, corrected), exact) <= EQUIVALENCE
     return JUDGED[2] if found and np.any(ssa == 1) else JUDGED[3]
 
@@ -231,7 +231,7 @@ def test_sun_at_a_quadrature_node(num_streams, corrected):
     )
     for i in range(count):
         column = [x[i] for x in columns]
-        exact = forty_digit_brf(*column, num_streams, corrected, True)
+        exact = forty_digit_brf(*column, num_streams, corrected, on_double_gauss=True)
         assert error(ours[i], exact) <= RIGHT
         around = [
             cdisort_brf(*column[:4], column[4] * (1 + step), *column[5:], num_streams, corrected)

@@ -95,7 +95,7 @@ def test_plane_albedos_converge_to_the_converged_fluxes(num_streams):
 
 
 # Largest relative error of the columns of `plumes` with the exact single scattering, of the clouds.
-# On the nodes of double Gauss they are 0.6 and 0.1 %, but half as near again in the median.
+# On the nodes of double Gauss they are 0.6 and 0.1 %.
 PLUME_BOUNDS = {8: 8.1e-3, 16: 1.75e-3}
 
 
