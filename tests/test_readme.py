@@ -41,6 +41,21 @@ def test_files_and_commands_that_it_names_exist():
         assert (ROOT / name).exists(), name
 
 
+def test_every_benchmark_is_on_the_page_of_results():
+    """Or is a part that another one runs; and every page of results is to be found there."""
+    folder = ROOT / "benchmarks"
+    page, scripts = (folder / "README.md").read_text(), list(folder.glob("*.py"))
+    codes = {path: path.read_text() for path in scripts}
+    for path, code in codes.items():
+        if "__main__" in code:
+            others = (x for other, x in codes.items() if other != path)
+            assert path.name in page or any(path.stem in x for x in others), path.name
+    linked = set(re.findall(r"\]\((results/\w+\.md|TRIED\.md)\)", page))
+    assert linked == {"TRIED.md", *(f"results/{x.name}" for x in (folder / "results").glob("*"))}
+    for name in re.findall(r"`(\w+\.py)", page.split("## Scripts")[0]):
+        assert (folder / name).exists(), name
+
+
 def test_its_ranges_are_those_that_are_checked():
     rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \| [^|]+ \|$", README, re.MULTILINE))
     assert {name: rows[name] for name in SOLVER} == {name: x.words for name, x in SOLVER.items()}

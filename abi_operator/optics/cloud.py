@@ -46,7 +46,7 @@ def liquid_cloud(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     if missing := first_missing(band.name, REFRACTIVE_INDEX):
         raise ValueError(f"no water index for band {missing!r}; have {list(REFRACTIVE_INDEX)}.")
     radius = effective_radius(atmosphere.liquid)
-    cloudy = radius > 0
+    cloudy = ~(radius <= 0)  # Where a state is no number nothing is, the cloud no less.
     radius = jnp.where(cloudy, radius, radius.dtype.type(_IDLE_RADIUS))
     radius_um = 1e6 * radius
     if atmosphere.liquid.optics == "mie":

@@ -38,8 +38,9 @@ def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
 
     .. math:: r_s \exp\frac{(r / r_s)^2 - 1}{2}, \qquad r_l \exp\frac{1 - (r_l / r)^2}{2},
 
-    whose slopes are continuous with that of r. A layer has no cloud unless both mass and number are
-    positive; that mass comes with number is checked where data enter a scene, not here.
+    whose slopes are continuous with that of r. A layer has no cloud where mass or number is 0; that
+    mass comes with number is checked where data enter a scene, not here. Mass that is no number,
+    or whose number is none, gives none.
 
     Parameters
     ----------
@@ -51,7 +52,8 @@ def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
 
 @pointwise
 def _radius(mass: Float[Array, "*n"], number: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    cloudy = (mass > 0) & (number > 0)
+    # What is no number is none of both, and so is what follows from it.
+    cloudy = ~((mass <= 0) | ((mass > 0) & (number <= 0)))
     small = cloudy & (mass <= number * (_UNIT_MASS * SMALLEST_RADIUS**3))
     large = cloudy & (mass >= number * (_UNIT_MASS * LARGEST_RADIUS**3))
     # Roots are divided, and not masses, as the derivative of a quotient squares its denominator; of

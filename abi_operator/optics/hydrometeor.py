@@ -173,9 +173,10 @@ def _radius(particles: Hydrometeor, optics: ClassOptics, habit: Habit) -> tuple[
 
 
 def _present(mass: Array, number: Array) -> Array:
-    # Below it the reciprocal, which a derivative needs, is not finite.
+    # Below it the reciprocal, which a derivative needs, is not finite. What is no number is neither,
+    # and so is what follows from it.
     tiny = np.finfo(mass.dtype).tiny * 4
-    return (mass > tiny) & (number > tiny)
+    return ~((mass <= tiny) | ((mass > tiny) & (number <= tiny)))
 
 
 @pointwise

@@ -67,7 +67,7 @@ def with_optical_thickness(cloud: LiquidCloud, value: Float[Array, "*batch"]) ->
 def with_droplet_radius(cloud: LiquidCloud, value: Float[Array, "*batch"]) -> LiquidCloud:
     """A cloud of the same optical thickness, layer by layer, with droplets of one radius. [um]"""
     radius = effective_radius(cloud)
-    cloudy = radius > 0
+    cloudy = ~(radius <= 0)  # what is no number stays none
     growth = jnp.where(cloudy, value[..., None] * _MICRON / jnp.where(cloudy, radius, 1), 1)
     # Mass is optical thickness times radius, and number is mass by radius cubed.
     return _with_paths(cloud, cloud.mass_path * growth, cloud.number_path / growth**2)
@@ -75,7 +75,7 @@ def with_droplet_radius(cloud: LiquidCloud, value: Float[Array, "*batch"]) -> Li
 
 def _layers_of(cloud: LiquidCloud) -> Float[Array, "*batch layer"]:
     radius = effective_radius(cloud)
-    cloudy = radius > 0
+    cloudy = ~(radius <= 0)  # what is no number stays none
     thickness = 1.5 * cloud.mass_path / WATER_DENSITY / jnp.where(cloudy, radius, 1)
     return jnp.where(cloudy, thickness, 0)
 

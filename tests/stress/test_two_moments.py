@@ -100,3 +100,19 @@ def test_optics_of_every_class_are_finite(kind, band, crystals, dtype):
             assert_right(kind, mass.astype(dtype), number.astype(dtype), band, crystals)
 
     of()
+
+
+@pytest.mark.parametrize(
+    ("kind", "how", "dtype"),
+    [("mie", (), np.float64), ("rain", (), np.float32), ("ice", ("C07", "rough"), np.float64)],
+)
+def test_what_is_no_number_is_not_an_empty_layer(kind, how, dtype):
+    """Not told apart inside `jax.jit`, a cloud would go missing; a layer without mass is empty
+    whatever its number."""
+    mass, number = np.full(COUNT, 1e-2, dtype), np.full(COUNT, 1e9, dtype)
+    mass[:3], number[2:5] = (np.nan, np.nan, 0.0), np.nan
+    (tau, scattering, _), _ = judge(kind, mass, number, *how)
+    unknown = np.isin(np.arange(COUNT), (0, 1, 3, 4))
+    for found in (np.asarray(tau), np.asarray(scattering)):
+        np.testing.assert_array_equal(np.isnan(found), unknown)
+    assert tau[2] == 0
