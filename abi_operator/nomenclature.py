@@ -44,6 +44,9 @@ HYDROMETEORS: dict[str, str] = {
 }
 """Classes of condensate in models, and how to say them. A scenario calls cloud water liquid."""
 
+UNSIMULATED = {"other_ice": "ice of further categories"}
+"""Condensate of models that is weighed and not simulated, likewise."""
+
 MODEL: dict[str, Variable] = {
     "latitude": Variable(HORIZONTAL, "degrees_north", "latitude", "latitude"),
     "longitude": Variable(HORIZONTAL, "degrees_east", "longitude", "longitude"),
@@ -68,7 +71,7 @@ MODEL: dict[str, Variable] = {
         f"{name}_mixing_ratio": Variable(
             ("layer", "y", "x"), "kg kg-1", f"{words} per mass of dry air"
         )
-        for name, words in HYDROMETEORS.items()
+        for name, words in (HYDROMETEORS | UNSIMULATED).items()
     },
     **{
         f"{name}_number_mixing_ratio": Variable(

@@ -76,6 +76,7 @@ def observe(
                 times=report["time"].values,
                 shape=(report.sizes["y"], report.sizes["x"]),
                 moving="time" in report["latitude"].dims,
+                attributes={"history": str(report.attrs.get("history", ""))},
                 grid=grid if "crs" in names else None,
                 command=typed(context),
             ) as writer:

@@ -26,9 +26,9 @@ FIRE_BANDS = ("C05", "C06", "C07")
 """Bands whose emission is simulated where there is a fire: without, C05 and C06 get no more than
 4e-5 of the sun's light from a ground of 300 K."""
 
-# Temperature of the ground up to which nothing has to shine in C05 and C06: there it would give C06
-# 9e-4 of the sun's light from a white ground, and C05 1e-6. [K]
-_WARMEST_WITHOUT_FIRE = 350.0
+WARMEST_WITHOUT_FIRE = 350.0
+"""Temperature of the ground up to which nothing has to shine in C05 and C06: there it would give
+C06 9e-4 of the sun's light from a white ground, and C05 1e-6. [K]"""
 # Distances that the sun has, and some more. [AU]
 _SUN_DISTANCE = 0.9, 1.1
 
@@ -95,7 +95,8 @@ def radiance(
     options = Options(bands, tuple(emitting), how)
     found = solve(Inputs(state, {x: sun[x] for x in emitting}), options)
     factor = [jnp.ones_like(mu0) if x in emitting else of_white_ground(mu0, sun[x]) for x in bands]
-    seen = jnp.cos(state.geometry.view_zenith) > 0
+    # A sun that is nowhere is not below the horizon.
+    seen = (jnp.cos(state.geometry.view_zenith) > 0) & ~jnp.isnan(mu0)
     return jnp.where(seen[..., None], found * jnp.stack(factor, axis=-1), jnp.nan)
 
 
@@ -153,10 +154,10 @@ def _refuse_hot_ground(state: State, bands: Sequence[str]) -> None:
     if state.fire is not None or state.surface_temperature is None or not dark:
         return
     warmth = np.asarray(state.surface_temperature)
-    if np.any(warmth > _WARMEST_WITHOUT_FIRE):
+    if np.any(warmth > WARMEST_WITHOUT_FIRE):
         raise ValueError(
             f"state.surface_temperature is {warmth.max():g} K, and without a fire no emission is "
-            f"simulated in {dark}: allowed is {_WARMEST_WITHOUT_FIRE:g} K at most. Give "
+            f"simulated in {dark}: allowed is {WARMEST_WITHOUT_FIRE:g} K at most. Give "
             "state.fire = Fire(fraction=0, temperature=...), or leave these bands out."
         )
 

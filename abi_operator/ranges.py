@@ -75,7 +75,10 @@ _AMOUNT = Range(0.0, 1e6, "[)")
 _POSITIVE = Range(0.0, 1e6, "()")
 _COSINE = Range(0.0, 1.0, "(]")
 _EDGE = Range(0.0, 1e9, "[)", "m")
-_TEMPERATURE = Range(0.0, 1e5, "()", "K")
+# Degrees Celsius of the ground and of most air lie below.
+_TEMPERATURE = Range(50.0, 1e5, "()", "K")
+# Foam covers all of a sea from 37 m/s on by the law that `surface.Ocean` follows.
+_WIND = Range(0.0, 37.0, "[]", "m s-1")
 _ZENITH = Range(0.0, math.pi, "[]", "rad", "0 to pi (angles are in rad)")
 # A difference of two azimuths is 2 pi at most, in float32 too; what is more is degrees.
 _AZIMUTH = Range(-6.2832, 6.2832, "[]", "rad", "-2 pi to 2 pi (angles are in rad)")
@@ -124,7 +127,7 @@ STATE: dict[str, Range] = {
     "effective_radius_um": Range(0.0, 1e6, "()", "um"),
     "fraction": SHARE,
     "albedo": SHARE,
-    "wind_speed": Range(0.0, 1e3, "[)", "m s-1"),
+    "wind_speed": _WIND,
     "solar_zenith": _ZENITH,
     "view_zenith": _ZENITH,
     "relative_azimuth": _AZIMUTH,
@@ -138,8 +141,7 @@ WEATHER: dict[str, Range] = {
     "temperature": Range(100.0, 500.0, "[]", "K"),
     # From the Antarctic plateau, at 175 K (Scambos et al. 2018, doi:10.1029/2018GL078133), to lava.
     "surface_temperature": Range(150.0, 1500.0, "[]", "K"),
-    # Foam covers all of a sea from 37 m/s on by the law that `surface.Ocean` follows.
-    "wind_speed": Range(0.0, 37.0, "[]", "m s-1"),
+    "wind_speed": _WIND,
     # Less than a whole column of air weighs.
     "mass_path": Range(0.0, 1.0e4, "[]", "kg m-2"),
 }

@@ -99,7 +99,7 @@ def with_the_suns_cosine(
     # Where brf is NaN its derivative in mu0 would be too.
     lit = (mu0 > 0) & (mu > 0)
     by_day = jnp.where(lit, mu0, 0) * jnp.where(lit, value, 0)
-    return jnp.where(mu > 0, by_day, jnp.nan)
+    return jnp.where((mu > 0) & ~jnp.isnan(mu0), by_day, jnp.nan)
 
 
 @jax.jit

@@ -77,7 +77,7 @@ def standard_atmosphere(
     Raises
     ------
     ValueError
-        Where there is no such atmosphere, or heights are not falling or beyond the table.
+        Where there is no such atmosphere, or heights are not falling, beyond the table or in km.
     """
     if name not in _PROFILES:
         raise ValueError(f"no standard atmosphere {name!r}; choose from {list(_PROFILES)}.")
@@ -86,6 +86,11 @@ def standard_atmosphere(
         raise ValueError(f"height must fall from level to level, top first; got {height}.")
     if levels[0] > 1e3 * _HEIGHT[0] or levels[-1] < 1e3 * _HEIGHT[-1]:
         raise ValueError(f"height must lie in 0-120000 m; got {levels[-1]} to {levels[0]}.")
+    if levels[0] - levels[-1] <= _HEIGHT[0]:
+        raise ValueError(
+            f"height is in m; the levels reach over {levels[0] - levels[-1]:g} m, as those of "
+            "heights in km do."
+        )
     profile = _PROFILES[name]
     above = np.interp(-levels, -1e3 * np.array(_HEIGHT), np.arange(len(_HEIGHT)))
     pressure = 100 * np.exp(_interpolate(np.log(profile.pressure), above))

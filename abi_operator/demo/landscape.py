@@ -1,12 +1,13 @@
 """A coast like southern California's: islands, a green strip, mountains, dry plains behind them."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from .noise import Noise, make_noise
 
-INLAND = (0.64, 0.77)
+INLAND = (0.64, math.sqrt(1 - 0.64**2))
 """Unit vector, east and north, from the sea to the land."""
 
 # Distance inland of the centre of the domain. [m]

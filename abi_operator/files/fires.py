@@ -11,6 +11,7 @@ import xarray as xr
 from ..nomenclature import FIRE_TABLE
 from ..ranges import WEATHER, Range
 from .errors import InputError
+from .utc import utc_time
 
 _ALLOWED = {
     "latitude": WEATHER["latitude"],
@@ -95,7 +96,10 @@ def _time(text: str, name: str, where: str) -> np.datetime64:
 
 
 def _in_utc(text: str) -> np.datetime64:
-    return np.datetime64(text.removesuffix("Z"), "ns")
+    time = utc_time(text.removesuffix("Z"))
+    if np.isnat(time):
+        raise ValueError
+    return time
 
 
 def _parsed(parse: Callable[[str], Any], text: str, name: str, where: str, what: str) -> Any:

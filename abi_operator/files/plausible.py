@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..nomenclature import HYDROMETEORS
+from ..nomenclature import HYDROMETEORS, UNSIMULATED
 from ..ranges import SHARE, WEATHER
 from .errors import InputError
 
@@ -49,6 +49,7 @@ _OTHER_NUMBER_TRACES = 1e4
 # Cloud is what air of 30 g kg-1 of vapour, as moist as over the warmest seas, can condense at once;
 # what falls gathers in a layer. [kg kg-1]
 _MOST_MASS = {"cloud": 0.03, "ice": 0.03, "rain": 0.05, "snow": 0.05, "graupel": 0.1, "hail": 0.1}
+_MOST_MASS |= dict.fromkeys(UNSIMULATED, 0.1)  # rimed ice, too
 # Ten times the 1e4 droplets per cubic centimetre of clouds over fires, which may all freeze. [kg-1]
 _MOST_NUMBER = {"cloud": 1e11, "ice": 1e11}
 _OTHER_MOST_NUMBER = 1e10
@@ -78,7 +79,7 @@ PLAUSIBLE: dict[str, Range] = {
     # A dew point of 43 degrees C at 1000 hPa; the highest observed, in Dhahran on 8 July 2003, is
     # 35, which is 0.037 kg kg-1.
     "vapour_mixing_ratio": Range(0, 0.06, _MASS_TRACES),
-    **{f"{name}_mixing_ratio": Range(0, _MOST_MASS[name], _MASS_TRACES) for name in HYDROMETEORS},
+    **{f"{name}_mixing_ratio": Range(0, most, _MASS_TRACES) for name, most in _MOST_MASS.items()},
     **{
         f"{name}_number_mixing_ratio": Range(
             0,

@@ -48,8 +48,8 @@ class ResultWriter:
     moving
         Whether latitude and longitude change from time to time.
     attributes
-        Global attributes besides ``Conventions``, ``source`` and ``history``; ``title`` has a
-        default.
+        Global attributes besides ``Conventions`` and ``source``; ``title`` has a default, and a
+        ``history`` goes on below the line of this file.
     grid
         Coordinates ``x``, ``y`` and ``crs`` of `projected`; None where there is no such map.
     command
@@ -80,16 +80,18 @@ class ResultWriter:
             raise InputError(
                 f"{path} cannot be written ({error.strerror}); give a path in a folder that can."
             ) from error
+        given = dict(attributes or {})
+        before = str(given.get("history", ""))
         now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
         source = f"abi_operator {__version__}"
         event = f"written by {source}" if command is None else f"{command} ({source})"
         self._file.setncatts(
             {"title": "Synthetic imagery of the GOES-R Advanced Baseline Imager"}
-            | dict(attributes or {})
+            | given
             | {
                 "Conventions": CONVENTIONS,
                 "source": source,
-                "history": f"{now} {event}",
+                "history": "\n".join(filter(None, (f"{now} {event}", before))),
             }
         )
 

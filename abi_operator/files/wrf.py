@@ -34,6 +34,8 @@ VARIABLE_MAP = {
     "QSNOW": "snow_mixing_ratio",
     "QGRAUP": "graupel_mixing_ratio",
     "QHAIL": "hail_mixing_ratio",
+    "QICE2": "other_ice_mixing_ratio",  # P3 with more than one category, Ishmael
+    "QICE3": "other_ice_mixing_ratio",
     "QNDROP": "cloud_number_mixing_ratio",  # NSSL schemes
     "QNCLOUD": "cloud_number_mixing_ratio",  # all others
     "QNRAIN": "rain_number_mixing_ratio",
@@ -57,7 +59,8 @@ VARIABLE_MAP = {
     "IVGTYP": "land_use",
     "LU_INDEX": "land_use",
 }
-"""WRF's name of a variable: ours. Of two that are alternatives the latter is preferred."""
+"""WRF's name of a variable: ours. Of two that are alternatives the latter is preferred; further
+categories of ice are added up."""
 
 REQUIRED = ("P", "PB", "PH", "PHB", "T", "QVAPOR", "QCLOUD", "XLAT", "XLONG")
 
@@ -82,6 +85,7 @@ _TAKEN_AS_THEY_ARE = (
     "wind_along_y",
 )
 
+_FURTHER_ICE = "other_ice_mixing_ratio"
 _FORMAT_ADVICE = "give a WRF output file (wrfout_*) in NetCDF"
 
 
@@ -166,7 +170,9 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
         }
         for name, ours in VARIABLE_MAP.items():
             if name in file and ours.endswith(_TAKEN_AS_THEY_ARE):
-                fields[ours] = _field(file, name, **place)
+                field = _field(file, name, **place)
+                adds = ours == _FURTHER_ICE and ours in fields
+                fields[ours] = fields[ours] + field if adds else field
         _check_sum(fields["layer_temperature"], "layer_temperature", **place)
         _check_sum(fields["height"], "height", **place)
         land_mask = _land_mask(file, **place)

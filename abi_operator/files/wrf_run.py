@@ -5,6 +5,7 @@ import xarray as xr
 
 from .errors import InputError
 from .netcdf import FilePath, load_finite
+from .utc import utc_time
 
 SCHEMES: dict[int, str] = {
     1: "kessler",
@@ -69,13 +70,10 @@ def times_of(file: xr.Dataset, path: FilePath) -> np.ndarray:
 
 def _time(text: str, name: str, path: FilePath) -> np.datetime64:
     """Parse WRF's way of writing a time, ``2007-10-23_18:00:00``."""
-    try:
-        time = np.datetime64(text.strip("\0 ").replace("_", "T"), "ns")
-    except ValueError:
-        time = np.datetime64("NaT", "ns")
+    time = utc_time(text.strip("\0 ").replace("_", "T"))
     if np.isnat(time):
         raise InputError(
-            f"{name} in {path} is {text!r}, which is no time; "
+            f"{name} in {path} is {text!r}, which is no time of 1678 to 2261; "
             "it should be written as 2007-10-23_18:00:00."
         )
     return time

@@ -24,6 +24,8 @@ UNITS = {
     "base": "m",
     "top": "m",
     "extinction_550": "m-1",
+    "aod_550": "1",
+    "scale_height": "m",
     "brightness": "1",
     "relative_extinction": "1",
     "ssa": "1",

@@ -2,6 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from ..bands import check_bands
@@ -25,11 +26,17 @@ class Imager(eqx.Module):
         Noise and calibration error of each band; drawn only where `observe` is given keys.
     fire_saturation_temperature
         Brightness temperature at which C07 saturates; None, the default, for the end of the L1b
-        files' range (411.9 K), 400 K for that of Grasso et al. (2013). [K]
+        files' range (411.9 K), 400 K for that of Grasso et al. (2013). Counts end with the range
+        whatever it is. [K]
     ceiling_width
         Relative width of a smooth ceiling; None, the default, for a hard one. [-]
     quantised
         Whether radiance is rounded to the counts of L1b files.
+
+    Raises
+    ------
+    ValueError
+        If the satellite is unknown, or a temperature that can be read is not above 0.
     """
 
     satellite: str = eqx.field(static=True, default="GOES-16")
@@ -40,6 +47,9 @@ class Imager(eqx.Module):
 
     def __check_init__(self):
         check_satellite(self.satellite)
+        hottest = self.fire_saturation_temperature
+        if isinstance(hottest, float | int | np.ndarray | np.floating) and not hottest > 0:
+            raise ValueError(f"fire_saturation_temperature is {hottest}; allowed is above 0 K.")
 
 
 class Observation(eqx.Module):
@@ -172,6 +182,9 @@ def _limited(
     if temperature is not None:
         temperature = jnp.asarray(temperature, radiance.dtype)
     ceiling = jnp.asarray(range_ceiling(band, imager.satellite, temperature), radiance.dtype)
+    if imager.quantised:  # counts end there, wherever the detector does
+        last = jnp.asarray(range_ceiling(band, imager.satellite), radiance.dtype)
+        ceiling = jnp.minimum(ceiling, last)
     saturated = radiance >= ceiling
     if imager.ceiling_width is None:
         return hard_ceiling(radiance, ceiling), saturated

@@ -33,7 +33,8 @@ def overlap(
         Edges, base below top, above the same zero as `height`. [m]
     """
     clipped = jnp.where(height >= top, top, jnp.where(height <= base, base, height))
-    return -jnp.diff(clipped)
+    # An edge that is no number is nowhere, and would leave all of the column to the plume.
+    return jnp.where(jnp.isnan(top - base), jnp.nan, -jnp.diff(clipped))
 
 
 def aerosol(atmosphere: Atmosphere, plume: str, band: AnyBand) -> OpticalProperties:

@@ -52,7 +52,7 @@ def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
 
 @pointwise
 def _radius(mass: Float[Array, "*n"], number: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    # What is no number is none of both, and so is what follows from it.
+    # What is no number is no empty layer, and what follows from it is no number either.
     cloudy = ~((mass <= 0) | ((mass > 0) & (number <= 0)))
     small = cloudy & (mass <= number * (_UNIT_MASS * SMALLEST_RADIUS**3))
     large = cloudy & (mass >= number * (_UNIT_MASS * LARGEST_RADIUS**3))

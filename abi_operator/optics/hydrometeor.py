@@ -127,7 +127,7 @@ def from_effective_radius(
         Name of the class, and what is assumed of each.
     """
     optics, habit = class_optics(name, classes)
-    present = effective_radius > 0
+    present = ~(effective_radius <= 0)
     log_path = jnp.log(jnp.where(present, effective_radius, _IDLE_RADIUS)) + math.log(4 / 3)
     number = mass_path * jnp.exp(-mean_mass_of_path(log_path, habit, optics.nu))
     return Hydrometeor(mass_path, jnp.where(present, number, 0))
@@ -173,8 +173,8 @@ def _radius(particles: Hydrometeor, optics: ClassOptics, habit: Habit) -> tuple[
 
 
 def _present(mass: Array, number: Array) -> Array:
-    # Below it the reciprocal, which a derivative needs, is not finite. What is no number is neither,
-    # and so is what follows from it.
+    # Below it the reciprocal, which a derivative needs, is not finite. What is no number is not
+    # empty, and what follows from it is no number either.
     tiny = np.finfo(mass.dtype).tiny * 4
     return ~((mass <= tiny) | ((mass > tiny) & (number <= tiny)))
 

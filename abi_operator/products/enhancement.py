@@ -40,7 +40,7 @@ def cira_stretch(
 
     .. math:: y = \frac{\log_{10} R - \log_{10} 0.0223}{0.75\,(1 - \log_{10} 0.0223)}
 
-    Clipped to 0..1, display only: reflectances below 0.0223 are black, and those above 3.9 white.
+    Clipped to 0..1, display only: reflectances below 0.0223 are black, and those above 2.17 white.
 
     Parameters
     ----------

@@ -109,7 +109,7 @@ def air_response(
         tau = STANDARD_DEPTH[band] / STANDARD_PRESSURE * pressure
     _, angles = floats(tau, mu0, mu, relative_azimuth)
     if dtype is not None:
-        angles = cast(dtype, *angles)
+        angles = cast(np.result_type(dtype, np.float16), *angles)  # of whole numbers, too
     if method == "crefl":
         return crefl_air(*angles)
     return rayleigh_air(*angles, beta2=BETA2.get(band, STANDARD_BETA2))

@@ -7,10 +7,12 @@ import xarray as xr
 
 from ..constants import FREEZING
 from ..files import InputError
-from ..nomenclature import HYDROMETEORS
+from ..nomenclature import HYDROMETEORS, UNSIMULATED
 
 CLASSES = tuple(name for name in HYDROMETEORS if name != "cloud")
 """Classes that are simulated beside liquid cloud."""
+
+_WORDS = HYDROMETEORS | UNSIMULATED
 
 # The scheme whose cloud water and rain are ice and snow below 0 C. (Hong et al. 2004,
 # doi:10.1175/1520-0493(2004)132<0103:ARATIM>2.0.CO;2)
@@ -26,7 +28,8 @@ def scheme_of(model: xr.Dataset, microphysics: str | None = None) -> str:
 def mixing_ratios(model: xr.Dataset, microphysics: str | None = None) -> dict[str, np.ndarray]:
     """Mass of each class of condensate per mass of dry air (layer, y, x). [kg kg-1]
 
-    Cloud water and rain of WSM3 are ice and snow below 0 C.
+    Cloud water and rain of WSM3 are ice and snow below 0 C. What is not simulated
+    (`nomenclature.UNSIMULATED`) is among them.
 
     Parameters
     ----------
@@ -37,7 +40,7 @@ def mixing_ratios(model: xr.Dataset, microphysics: str | None = None) -> dict[st
     """
     found = {
         name: model[f"{name}_mixing_ratio"].values
-        for name in HYDROMETEORS
+        for name in _WORDS
         if f"{name}_mixing_ratio" in model
     }
     if scheme_of(model, microphysics) == _ICE_IN_DISGUISE:
@@ -92,6 +95,6 @@ def weigh(model_paths: dict[str, np.ndarray], simulated: dict[str, np.ndarray]) 
     for name, mass in model_paths.items():
         lost = float((mass - simulated[name]).sum()) if name in simulated else float(mass.sum())
         if lost > 0:
-            words = HYDROMETEORS[name]
+            words = _WORDS[name]
             left_out[f"{words} without number" if name in simulated else words] = lost
     return Condensate(float(sum(mass.sum() for mass in model_paths.values())), left_out)

@@ -1,7 +1,8 @@
 """What columns send to the imager: sunlight alone, or sunlight and emission as one radiance.
 
 A column is solved for as little as it needs. Where nothing shines the answer to sunlight is
-enough, by day; in C07 all columns shine, and in C05 and C06 those in which it burns, day and night.
+enough, by day; in C07 all columns shine, and in C05 and C06 those in which it burns, or whose
+ground is as hot as that (`radiance.WARMEST_WITHOUT_FIRE`), day and night.
 """
 
 import dataclasses
@@ -11,17 +12,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..atmosphere import State
+from ..atmosphere import Fire, State
 from ..machine.listening import Listener, listening
 from ..nomenclature import QUALITY_FLAGS
 from ..planck import brightness_temperature
-from ..radiance import FIRE_BANDS, THERMAL, radiance
+from ..radiance import FIRE_BANDS, THERMAL, WARMEST_WITHOUT_FIRE, radiance
 from ..reflectance import brf
 from ..satellites import solar_irradiance
 from .kinds_of_ground import by_kind
 
 # Pixels with one of these flags are not solved; those of a night may shine.
 _UNSEEN = QUALITY_FLAGS["no_albedo"] | QUALITY_FLAGS["out_of_sight"]
+_HARMLESS = 1000.0  # temperature of a fire that is none [K]
 _UNSOLVED = _UNSEEN | QUALITY_FLAGS["night"]
 
 
@@ -60,7 +62,7 @@ def light(
     settings
         Others of the operator, by name.
     listener
-        Is told of columns as they are solved, burning ones of C05 and C06 not twice.
+        Is told of columns as they are solved, those that shine in C05 and C06 not twice.
     """
     with listening(listener):
         fields = _of_sunlight(
@@ -70,6 +72,7 @@ def light(
     fields["radiance"] = fields["reflectance_factor"] * irradiance
     uncounted = None if listener is None else Unheard(listener)
     mu0 = np.cos(np.asarray(states.geometry.solar_zenith))
+    burning = states if states.fire is not None else _with_no_fire(states)
     for k, band in enumerate(bands):
         shines = _shining(states, flags, band)
         if not shines.any():
@@ -78,7 +81,7 @@ def light(
             chosen = shines & (streams == number)
             with listening(listener if band in THERMAL else uncounted):
                 seen = radiance(
-                    _some(states, chosen),
+                    _some(states if band in THERMAL else burning, chosen),
                     (band,),
                     satellite=satellite,
                     sun_distance=distance,
@@ -104,9 +107,21 @@ def _shining(states: State, flags: np.ndarray, band: str) -> np.ndarray:
     seen = (flags & _UNSEEN) == 0
     if band in THERMAL:
         return seen
-    if band not in FIRE_BANDS or states.fire is None:
+    if band not in FIRE_BANDS:
         return np.zeros_like(seen)
-    return seen & (np.asarray(states.fire.fraction) > 0)
+    ground, air = states.surface_temperature, states.atmosphere.temperature
+    hot = np.zeros_like(seen)
+    if ground is not None and air is not None:
+        hot |= np.asarray(ground) > WARMEST_WITHOUT_FIRE
+    if states.fire is not None:
+        hot |= np.asarray(states.fire.fraction) > 0
+    return seen & hot
+
+
+def _with_no_fire(states: State) -> State:
+    """Columns that shine by their ground alone in C05 and C06, too."""
+    none = np.zeros_like(np.asarray(states.geometry.solar_zenith))
+    return dataclasses.replace(states, fire=Fire(none, none + _HARMLESS))
 
 
 def _of_sunlight(

@@ -48,7 +48,7 @@ def simulate(
     r"""Simulate the radiances and reflectances of a scenario.
 
     In C07 sunlight and emission are one radiance, and so they are in C05 and C06 where it burns
-    (`light`). Elsewhere radiance follows from the reflectance factor,
+    or the ground is as hot (`light`). Elsewhere radiance follows from the reflectance factor,
     :math:`L = \rho E_0 / (\pi d^2)`, with the solar irradiance of the scenario's satellite and the
     distance of the sun at its time (1 AU where it has none). Clouds
     scatter, and a low sun shines through layers, as the scenario says (`cloud_optics_of`,
@@ -80,8 +80,9 @@ def simulate(
         and hydrometeors; with C07 brightness temperature; and the share of hydrometeors' optical
         depth at sizes for which optics were not fitted, by which pixels are flagged
         ``outside_fit``. C07 has no reflectance factor and no brf, which are NaN. By night the
-        reflectance factor is 0 and brf NaN; out of the satellite's sight, and by day without
-        albedo, all is NaN. The reflectance factor of a fire is that of its radiance, by night too.
+        reflectance factor is 0 and brf NaN; out of the satellite's sight all is NaN, and so it is
+        by day, and C07 by night, where any of the scenario's bands has no albedo. The reflectance
+        factor of a fire is that of its radiance, by night too.
 
     Raises
     ------

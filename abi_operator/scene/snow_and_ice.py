@@ -24,7 +24,8 @@ _TYPES = ", ".join(SNOW_AND_ICE_ALBEDO)
 _SNOW_TYPES = ", ".join(name for name in SNOW_AND_ICE_ALBEDO if name.endswith("snow"))
 _NO_ICE = (
     "the model has sea ice (SEAICE in WRF's files) and no albedo of it was named: its columns are "
-    "not simulated (sea_ice_count tells how many); name one (--sea-ice-albedo), a number or "
+    "not simulated but where snow of known albedo covers it (sea_ice_count tells how many have "
+    "ice); name one (--sea-ice-albedo), a number or "
     f"{_TYPES}."
 )
 _BARE = (
@@ -125,10 +126,10 @@ def with_snow_and_ice(
         of_ice, values = _mixed(of_ice, of_snow, snow), _mixed(values, of_snow, snow * (ice == 0))
     if ice.any():
         counts["sea_ice_count"] = int(np.count_nonzero(ice))
-        if sea_ice_albedo is None:
-            _warn(_NO_ICE)
-        else:
+        if sea_ice_albedo is not None:
             sources.append(f"sea ice {_name(sea_ice_albedo)}")
+        elif np.isnan(_mixed(np.zeros_like(values), of_ice, ice)).any():
+            _warn(_NO_ICE)
         values = _mixed(values, of_ice, ice)
     return values, sources, counts
 

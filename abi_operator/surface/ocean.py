@@ -77,8 +77,9 @@ class Ocean(eqx.Module):
     holds what its surface lets in and out. The sea is as rough from all sides (Cox and Munk find
     the variance along the wind up to twice that across it).
 
-    Winds are not clipped: from 37 m/s on W is above 1, and storms above 15 m/s lie beyond what
-    Cox and Munk saw. A dead calm is still rough, with a variance of 0.003.
+    Winds are not clipped: above 37 m/s, where W would be above 1, they are refused with the state
+    (`check_state`), and storms above 15 m/s lie beyond what Cox and Munk saw. A dead calm is still
+    rough, with a variance of 0.003.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ from states import column, stacked
 import abi_operator
 from abi_operator import BANDS, GRASSO2013, band_columns, brf, reflectance_factor
 from abi_operator.optical_properties import OpticalProperties
+from abi_operator.reflectance import with_the_suns_cosine
 from abi_operator.solver import on_double_gauss
 
 # Rayleigh depth at 1013.25 hPa and beta2 (Bodhaine et al. 1999); smoke relative to 555 nm, its
@@ -65,6 +66,12 @@ def test_reflectance_factor_contains_the_cosine_of_the_sun():
     states = column(), column(smoke_aod=0.1)
     factors = reflectance_factor(stacked(states), **OPTIONS)
     np.testing.assert_allclose(factors, np.cos(0.6) * solved(*states), rtol=1e-14)
+
+
+def test_a_sun_that_is_nowhere_is_not_below_the_horizon():
+    zeniths = jnp.asarray([0.6, np.nan, 2.0, 0.6]), jnp.asarray([0.8, 0.8, 0.8, 2.0])
+    found = with_the_suns_cosine(jnp.full((4, 1), 0.5), *zeniths)[:, 0]
+    np.testing.assert_allclose(found, [0.5 * np.cos(0.6), np.nan, 0.0, np.nan])
 
 
 def test_ground_alone_shows_its_albedo():

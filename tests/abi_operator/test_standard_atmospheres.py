@@ -123,6 +123,11 @@ def test_doors():
 
 
 @pytest.mark.float32
+def test_heights_in_km_are_refused():
+    with pytest.raises(ValueError, match="height is in m; the levels reach over 80 m"):
+        standard_atmosphere("us_standard", np.linspace(80, 0, 41))
+
+
 def test_default_precision():
     dtype = jnp.zeros(()).dtype
     leaves = jax.tree.leaves(standard_atmosphere("midlatitude_winter"))

@@ -48,6 +48,8 @@ def test_a_table_is_read_in_any_order_of_its_columns(written):
         (HEAD + "33,-117,900,0\n", "area is 0; it must be above 0"),
         (HEAD + "33,-117,900,nan\n", "area is nan"),
         (HEAD[:-1] + ",start\n33,-117,900,4e4,noon\n", "start is 'noon'; it must be a time"),
+        # A year of many digits, which NumPy takes for another.
+        (HEAD[:-1] + ",end\n33,-117,900,4e4,20071023\n", "end is '20071023'; it must be a time"),
         (
             HEAD[:-1] + ",start,end\n33,-117,900,4e4,2007-10-23T19,2007-10-23T18\n",
             "the fire ends at 2007-10-23T18:00:00.000000000, which is not after start",

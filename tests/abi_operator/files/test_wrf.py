@@ -190,6 +190,13 @@ def test_optional_hydrometeors_are_read(write_wrf_twin, name, ours):
     np.testing.assert_array_equal(dataset[ours], values[0, ::-1])
 
 
+def test_further_categories_of_ice_are_added_up(write_wrf_twin):
+    one = np.full((2, 4, 3, 2), 1e-3, np.float32)
+    dataset = read_wrf(write_wrf_twin(extra={"QICE2": (LAYERS, one), "QICE3": (LAYERS, one)}), 0)
+    np.testing.assert_allclose(dataset["other_ice_mixing_ratio"], 2e-3, rtol=FLOAT32)
+    assert "ice_mixing_ratio" not in dataset
+
+
 def test_the_ground_is_read_where_it_is_there(write_wrf_twin):
     values = np.linspace(280, 300, 12, dtype=np.float32).reshape(2, 3, 2)
     fields = {"TSK": (SURFACE, values), "EMISS": (SURFACE, values / 320)}
@@ -282,7 +289,8 @@ def test_a_layer_without_thickness_is_refused(twin):
 
 
 def test_a_time_that_is_none_is_refused(write_wrf_twin):
-    for text in ("0000-00-00_00:00:00", " " * 19):
+    # Nanoseconds cannot count the last, which NumPy takes for a day of 1754.
+    for text in ("0000-00-00_00:00:00", " " * 19, "0001-01-01_18:00:00"):
         with pytest.raises(InputError, match=f"Times in .* is '{text}', which is no time"):
             wrf_coordinates(write_wrf_twin(time_texts=("2007-10-23_18:00:00", text)))
 

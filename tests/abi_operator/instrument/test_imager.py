@@ -283,3 +283,19 @@ def test_errors_name_what_came():
         observe(jnp.ones(3), jnp.ones(2), "C01")
     with pytest.raises(ValueError, match="floor is not specified in band 'green'"):
         observe(jnp.ones(2), jnp.ones(2), "green", key=jax.random.key(0))
+
+
+@pytest.mark.parametrize("quantised", [False, True])
+def test_counts_end_below_a_hotter_ceiling(quantised):
+    """At 411.9 K: a pixel of 430 K is above them, though not above a detector's 450 K."""
+    imager = Imager(fire_saturation_temperature=450.0, quantised=quantised)
+    seen = observe_mean(in_band_radiance(jnp.asarray([300.0, 430.0, 460.0]), "C07"), "C07", imager)
+    assert seen.saturated.tolist() == [False, quantised, True]
+    hottest = 411.86 if quantised else 450.0
+    np.testing.assert_allclose(seen.brightness_temperature[2], hottest, atol=0.05)
+
+
+@pytest.mark.parametrize("temperature", [np.nan, 0.0, -300.0])
+def test_a_ceiling_that_is_none_is_refused(temperature):
+    with pytest.raises(ValueError, match="fire_saturation_temperature is .*; allowed is above 0 K"):
+        Imager(fire_saturation_temperature=temperature)

@@ -32,6 +32,12 @@ def test_overlap(base, top, expected):
     np.testing.assert_allclose(overlap(LEVELS, jnp.asarray(base), jnp.asarray(top)), expected)
 
 
+@pytest.mark.parametrize(("base", "top"), [(1.0, np.nan), (np.nan, 3.0), (np.nan, np.nan)])
+def test_an_edge_that_is_no_number_is_nowhere(base, top):
+    """It would leave all of the column above or below it to the plume."""
+    assert np.isnan(overlap(LEVELS, jnp.asarray(base), jnp.asarray(top))).all()
+
+
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 def test_derivative_on_a_level_belongs_to_the_layer_inside(mode):
     derivatives = jax.jit(mode(overlap, argnums=(1, 2)))

@@ -306,3 +306,10 @@ def test_what_is_not_known_is_refused(make_atmosphere):
         varied(efficiencies="mie")
     with pytest.raises(ValueError, match="no efficiencies 'fu1996' for 'snow'"):
         varied(habit="drops", efficiencies="fu1996")
+
+
+def test_a_radius_that_is_no_number_gives_none():
+    """Told apart from no particles: the mass would go missing."""
+    radius = jnp.asarray([3e-5, np.nan, 0.0])
+    number = from_effective_radius(jnp.full(3, 0.1), radius, "ice").number_path
+    assert number[0] > 0 and np.isnan(number[1]) and number[2] == 0

@@ -102,3 +102,11 @@ def test_wrong_arguments_are_refused():
         surrounding_mean(np.zeros((2, 2)), np.zeros((2, 2), bool), 0)
     with pytest.raises(ValueError, match=r"axes y and x; got a field of shape \(2,\)"):
         surrounding_mean(np.zeros(2), np.zeros(2, bool))
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.int8, np.int64])
+def test_a_mask_of_numbers_is_one_of_truths(kind):
+    rng = np.random.default_rng(5)
+    field, fire = rng.uniform(0.1, 0.3, (6, 7)), rng.random((6, 7)) < 0.3
+    expected = surrounding_mean(field, fire, 1)
+    np.testing.assert_array_equal(surrounding_mean(field, fire.astype(kind), 1), expected)

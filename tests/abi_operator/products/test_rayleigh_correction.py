@@ -162,3 +162,12 @@ def test_types_may_be_mixed():
         assert single.dtype == mixed.dtype == np.float32 and isinstance(single, np.ndarray)
         for other in (single, mixed, plain):
             np.testing.assert_allclose(other, exact, atol=2e-6)
+
+
+@pytest.mark.parametrize("method", ["operator", "crefl"])
+def test_whole_numbers_are_numbers(method):
+    """A reflectance of 1 or 0, whatever its type: angles beside it keep their digits."""
+    angles = 0.8, 0.7, 1.0
+    found = rayleigh_corrected("C01", np.array([1, 0]), *angles, method=method)
+    expected = rayleigh_corrected("C01", np.array([1.0, 0.0]), *angles, method=method)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -1,5 +1,7 @@
 """Fires of a scene: in which column they burn, and what is seen of them."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -162,5 +164,15 @@ def test_fires_are_seen_by_day_and_by_night(burning):
     light = solar_irradiance("C06", "GOES-16") / (np.pi * distance**2)
     np.testing.assert_allclose(of_c06["reflectance_factor"][burns], seen[0][burns] / light)
     assert of_c06["reflectance_factor"][night] > 0.01 and np.isnan(of_c06["brf"][night])
+    # A ground as hot shines without a fire: as one that has a share of nothing in flames.
+    hot = burning.drop_vars(names)
+    hot["surface_temperature"][day] = 800.0
+    shining = simulate(hot, **OPTIONS)
+    states = column_states(hot, BANDS)
+    none = np.zeros_like(states.surface_temperature)
+    states = dataclasses.replace(states, fire=Fire(none, none + 900.0))
+    expected = np.reshape(radiance(states, ("C06",), **how), (3, 2))[day]
+    np.testing.assert_allclose(shining["radiance"].sel(band="C06").values[day], expected)
+    assert expected > 3 * without["radiance"].sel(band="C06").values[day]
     mu0 = np.cos(np.radians(burning["solar_zenith_angle"].values[day]))
     assert of_c06["brf"][day] == pytest.approx(of_c06["reflectance_factor"][day] / mu0)

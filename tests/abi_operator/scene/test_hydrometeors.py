@@ -221,3 +221,14 @@ def test_condensate_that_is_left_out_is_weighed(make_model):
     np.testing.assert_allclose(left_out["hail"], 2 * left_out["rain"], rtol=ROUNDING)
     liquid = found.paths["cloud"].mass.sum()
     np.testing.assert_allclose(total, liquid + sum(left_out.values()), rtol=ROUNDING)
+
+
+def test_ice_of_further_categories_is_weighed_and_not_simulated(make_model):
+    model = make_model(ice_mixing_ratio=1e-4, ice_number_mixing_ratio=1e4)
+    model["other_ice_mixing_ratio"] = 3 * model["ice_mixing_ratio"]
+    found = paths(model)
+    assert list(found.paths) == ["cloud", "ice"]
+    lost = found.condensate.left_out
+    assert list(lost) == ["ice of further categories"]
+    ice = found.paths["ice"].mass.sum()
+    np.testing.assert_allclose(lost["ice of further categories"], 3 * ice, rtol=ROUNDING)

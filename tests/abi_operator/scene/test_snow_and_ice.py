@@ -85,6 +85,15 @@ def test_snow_lies_on_ice_and_covers_land_without_albedo(make_model, make_albedo
     np.testing.assert_allclose(values[0, :, LAND], 0.9)
 
 
+def test_ice_under_snow_alone_needs_no_albedo_of_its_own(make_model):
+    """Nor is it warned of: all warnings are errors here, but the one that is expected."""
+    model = make_model(sea_ice=ICE, land_mask=FROZEN_LAND, snow_cover=[[0, 1], [1, 1], [1, 1]])
+    with pytest.warns(UserWarning, match="as if nothing") as told:
+        values, _ = surface_albedo(model, BANDS, None, 0.06, snow_albedo=0.9)
+    assert not any("sea ice" in str(one.message) for one in told)
+    np.testing.assert_allclose(values[0, :, SEA], [0.06, 0.75 * 0.06 + 0.25 * 0.9, 0.9])
+
+
 def test_cover_follows_from_mass_where_the_model_does_not_tell(make_model):
     mass = [[0.0, 0.05], [0.0, 5.0], [30.0, 30.0]]
     np.testing.assert_allclose(
