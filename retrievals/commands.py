@@ -233,7 +233,11 @@ def _to_netcdf(retrieval: xr.Dataset, path: Path) -> None:
 
 
 def _write_csv(report: xr.Dataset, path: Path) -> None:
-    """Write scores by group, then counts and shares of result codes, then the detection."""
+    """Write scores by group, then counts and shares of result codes, then the detection, then what
+    intervals hold, which are a table of their own: no row stands for several of another's."""
     dims = [dim for dim in ("group", "code", "detection") if dim in report.dims]
-    tables = [report.drop_dims(set(dims) - {dim}).to_dataframe() for dim in dims]
+    of_dims = [[n for n, x in report.data_vars.items() if x.dims == (dim,)] for dim in dims]
+    intervals = [n for n, x in report.data_vars.items() if len(x.dims) > 1]
+    chosen = [names for names in (*of_dims, intervals) if names]
+    tables = [report[names].reset_coords(drop=True).to_dataframe() for names in chosen]
     path.write_text("\n".join(table.to_csv() for table in tables))

@@ -41,9 +41,11 @@ from .fire_detection import DETECTED, Surroundings, hottest_of
 from .fire_pixels import codes_before, measured_light, surroundings_by_day_and_night
 from .forward import ForwardModel, prepared
 from .images import (
+    check_noise,
     forward_model,
     how_made,
     images_of,
+    in_one_row,
     retrieved_fields,
     solved_whole,
 )
@@ -52,6 +54,7 @@ from .observation import (
     Observation,
     add_noise,
     distance_of,
+    has_calibration_error,
     imager_of,
     measurement,
 )
@@ -118,7 +121,7 @@ def retrieve_fires(
     Raises
     ------
     InputError
-        Where the Dataset lacks a variable or a band.
+        Where the Dataset lacks a variable or a band, or has noise and more is to be added.
     ValueError
         Where a band is none in which a fire shines, background is none of `BACKGROUNDS`, or `where`
         none of `WHERE_OF_FIRES`.
@@ -128,6 +131,7 @@ def retrieve_fires(
         raise ValueError(f"background must be one of {', '.join(BACKGROUNDS)}; got {background!r}.")
     check_where(where, WHERE_OF_FIRES)
     _check(dataset, bands, vector.size, prior)
+    check_noise(dataset, noise)
     num_streams = streams_of_attributes(dataset.attrs) if num_streams is None else num_streams
     with jax.enable_x64(True):
         forward = forward_model(dataset, vector, bands, num_streams)
@@ -157,7 +161,7 @@ def retrieve_fires(
         if attempted.any():
             rows = zip(images, measured, limited, around, attempted, strict=True)
             parts = [_gathered(forward, imager, *row, background) for row in rows if row[-1].any()]
-            observations, states = jax.tree.map(lambda *x: np.concatenate(x), *parts)
+            observations, states = in_one_row(parts)
             exact = not noise and prior is None and background == "stored"
             fields, codes[attempted] = retrieved_fields(
                 forward,
@@ -170,7 +174,7 @@ def retrieve_fires(
                 excess=background == "neighbours",
                 assumed=assumed_of_fire(bands) if assumed is None else assumed,
             )
-    about = how_made(bands, num_streams, noise, seed, prior) | {
+    about = how_made(dataset, bands, num_streams, noise, seed, prior) | {
         "background": background,
         "detection_threshold": threshold,
     }
@@ -224,6 +228,7 @@ def _gathered(
         measured[:, y, x].T,
         forward.bands,
         imager,
+        calibration=has_calibration_error(image),
         sun_distance=distance,
         saturated=limited[:, y, x].T,
     )

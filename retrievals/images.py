@@ -19,7 +19,14 @@ from abi_operator.settings import streams_of_attributes
 from .forward import ForwardModel, prepared
 from .intervals import posterior_intervals
 from .inverse import DEFAULT_MINIMISER, Minimiser
-from .observation import Observation, add_noise, imager_of, known_saturated, observe
+from .observation import (
+    Observation,
+    add_noise,
+    has_noise,
+    imager_of,
+    known_saturated,
+    observe,
+)
 from .optimal_estimation import estimates
 from .pixels import retrieve_pixels
 from .prior import Prior
@@ -31,6 +38,8 @@ from .usable_pixels import WHERE, Where, check_where, usable
 
 REFLECTIVE = ("C01", "C02", "C03", "C04", "C05", "C06")
 """Bands of which a result can be retrieved from."""
+# What a result says of its observation, for the product to say as well.
+_OBSERVED = "satellite", "calibration_error", "quantised", "fire_saturation_temperature"
 
 
 def retrieve_image(
@@ -108,7 +117,7 @@ def retrieve_image(
     Raises
     ------
     InputError
-        Where the Dataset lacks a variable or a band.
+        Where the Dataset lacks a variable or a band, or has noise and more is to be added.
     ValueError
         Where `where` is none of these; where smooth is not above 0, comes without prior or with
         diagnostics, which are of single pixels.
@@ -120,6 +129,7 @@ def retrieve_image(
             "smooth needs a prior, and has no diagnostics, which are of single pixels."
         )
     _check(dataset, bands, species, vector.size, prior)
+    check_noise(dataset, noise)
     if num_streams is None:
         num_streams = streams_of_attributes(dataset.attrs)
     with jax.enable_x64(True):
@@ -144,7 +154,7 @@ def retrieve_image(
                 assumed=assumed,
                 smooth=None if smooth is None else smoothness(attempted, smooth),
             )
-    about = how_made(bands, num_streams, noise, seed, prior)
+    about = how_made(dataset, bands, num_streams, noise, seed, prior)
     about |= {} if species is None else {"species": species}
     about |= {} if smooth is None else {"smooth_length_in_pixels": smooth}
     about |= attributes or {}
@@ -220,20 +230,33 @@ def solved_whole(dataset: xr.Dataset) -> bool:
     """Whether a result has no error, of its making or its observation, so that a fit could be
     exact; not where columns have streams of their own, of which a retrieval has the most for all.
     """
-    noise = str(dataset.attrs.get("noise", "none"))
-    counted = int(dataset.attrs.get("quantised", 0)) == 1
     made_with_errors = {"error_budget", "streams_error"} & set(dataset.attrs)
-    return not made_with_errors and noise == "none" and not counted
+    return not made_with_errors and not has_noise(dataset) and not imager_of(dataset).quantised
+
+
+def check_noise(dataset: xr.Dataset, noise: bool) -> None:
+    """Refuse to add noise to a result that has some: S_obs is that of noise drawn once."""
+    if noise and has_noise(dataset):
+        raise InputError(
+            f"the result has noise ({dataset.attrs['noise']}); retrieve it without adding more."
+        )
 
 
 def how_made(
-    bands: tuple[str, ...], num_streams: int, noise: bool, seed: int, prior: object
+    dataset: xr.Dataset,
+    bands: tuple[str, ...],
+    num_streams: int,
+    noise: bool,
+    seed: int,
+    prior: object,
 ) -> dict[str, Any]:
-    """Attributes of a product that tell how it was made."""
-    return {
+    """Attributes of a product that tell how it was made, and of which measurements."""
+    own = str(dataset.attrs.get("noise", "none"))
+    observed = {name: dataset.attrs[name] for name in _OBSERVED if name in dataset.attrs}
+    return observed | {
         "bands": " ".join(bands),
         "num_streams": num_streams,
-        "noise": f"added with seed {seed}" if noise else "none",
+        "noise": f"added with seed {seed}" if noise else own,
         "prior": "none" if prior is None else "normal distribution",
     }
 
@@ -287,4 +310,18 @@ def _gather(
             # reflectances are those of sunlight alone.
             states = replace(states_of_result(columns, bands), fire=None)
             parts.append((observe(columns, bands), states))
-    return jax.tree.map(lambda *arrays: np.concatenate(arrays), *parts)
+    return in_one_row(parts)
+
+
+def in_one_row(parts: list[tuple[Observation, State]]) -> tuple[Observation, State]:
+    """Measurements and states of the pixels of several images.
+
+    Where the sun is low in one of them its path is that of a sphere in all, which is that of flat
+    layers where it is not (`Geometry`): one kind of state, and not two.
+    """
+    low = any(states.geometry.spherical for _, states in parts)
+    alike = [
+        (seen, replace(states, geometry=replace(states.geometry, spherical=low)))
+        for seen, states in parts
+    ]
+    return jax.tree.map(lambda *arrays: np.concatenate(arrays), *alike)

@@ -18,6 +18,7 @@ from abi_operator.instrument import (
     radiance_from_reflectance_factor,
     range_ceiling,
     reflectance_factor_from_radiance,
+    rounding_deviation,
 )
 from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.radiance import FIRE_BANDS
@@ -144,7 +145,8 @@ def noise_sigma(measured: ArrayLike, band: str, imager: Imager = IMAGER) -> np.n
     measured
         Reflectance factor, or in C07 radiance; below 0 the noise is that of a dark scene.
     band, imager
-        Name of the band, and the instrument, whose noise is `abi_operator.instrument.Noise`.
+        Name of the band, and the instrument, whose noise is `abi_operator.instrument.Noise`; of
+        one whose radiances are quantised what rounding takes off is part of it.
 
     Returns
     -------
@@ -153,11 +155,13 @@ def noise_sigma(measured: ArrayLike, band: str, imager: Imager = IMAGER) -> np.n
     """
     dark = jnp.maximum(jnp.asarray(measured, float), 0)
     satellite = imager.satellite
-    if band == THERMAL:
-        return np.asarray(noise_deviation(dark, band, satellite, imager.noise))
-    radiance = radiance_from_reflectance_factor(dark, band, satellite)
-    sigma = noise_deviation(radiance, band, satellite, imager.noise)
-    return np.asarray(reflectance_factor_from_radiance(sigma, band, satellite))
+    rounded = rounding_deviation(band, satellite) if imager.quantised else 0.0
+    thermal = band == THERMAL
+    radiance = dark if thermal else radiance_from_reflectance_factor(dark, band, satellite)
+    sigma = jnp.hypot(noise_deviation(radiance, band, satellite, imager.noise), rounded)
+    return np.asarray(
+        sigma if thermal else reflectance_factor_from_radiance(sigma, band, satellite)
+    )
 
 
 def ceiling(band: str, imager: Imager = IMAGER) -> float:
@@ -166,6 +170,8 @@ def ceiling(band: str, imager: Imager = IMAGER) -> float:
     if temperature is not None:
         temperature = jnp.asarray(temperature, float)
     top = jnp.asarray(range_ceiling(band, imager.satellite, temperature), float)
+    if imager.quantised:  # counts end there, wherever the detector does
+        top = jnp.minimum(top, jnp.asarray(range_ceiling(band, imager.satellite), float))
     if band != THERMAL:
         top = reflectance_factor_from_radiance(top, band, imager.satellite)
     return float(top)
@@ -252,6 +258,7 @@ def add_noise(
     saturated
         What is saturated (`known_saturated`), and stays as it is: no noise changes a ceiling.
     """
+    imager = replace(imager, quantised=False)  # what was rounded off is off already
     noisy = measured.copy(deep=True)
     for band in noisy["band"].values:
         if band == "green":  # which the instrument lacks
@@ -264,12 +271,24 @@ def add_noise(
 
 
 def imager_of(dataset: xr.Dataset) -> Imager:
-    """The instrument of a result: its satellite, and where C07 saturates if it was observed so."""
+    """The instrument of a result: its satellite, and if it was observed so, where C07 saturates
+    and whether radiances are counts."""
     hottest = dataset.attrs.get("fire_saturation_temperature")
     return Imager(
         str(dataset.attrs.get("satellite", IMAGER.satellite)),
         fire_saturation_temperature=None if hottest is None else float(hottest),
+        quantised=int(dataset.attrs.get("quantised", 0)) == 1,
     )
+
+
+def has_noise(dataset: xr.Dataset) -> bool:
+    """Whether a result was observed with the instrument's noise."""
+    return str(dataset.attrs.get("noise", "none")) != "none"
+
+
+def has_calibration_error(dataset: xr.Dataset) -> bool:
+    """Whether a result was observed with an error of the calibration, which S_obs then has."""
+    return str(dataset.attrs.get("calibration_error", "none")) != "none"
 
 
 def distance_of(image: xr.Dataset) -> float:
@@ -285,7 +304,8 @@ def known_saturated(dataset: xr.Dataset) -> xr.DataArray | None:
 def observe(columns: xr.Dataset, bands: tuple[str, ...]) -> Observation:
     """Take the measurement vectors of a Dataset of one time with a dimension ``column``.
 
-    The instrument is that of the Dataset (`imager_of`). Bands in which a fire of the scenario
+    The instrument is that of the Dataset (`imager_of`), and so are the errors: the calibration's is
+    part of sigma where the Dataset has one. Bands in which a fire of the scenario
     shines are missing: it is not part of the forward models of reflectances. Ceilings are those of
     the sun's distance, which the observation does not have unless there is C07 in it: reflected
     light alone does not tell.
@@ -302,5 +322,12 @@ def observe(columns: xr.Dataset, bands: tuple[str, ...]) -> Observation:
         limited = limited.sel(band=list(bands)).transpose("column", "band").values
     values = measured.transpose("column", "band").values.astype(np.float64)
     distance = np.full(len(values), distance_of(columns))
-    found = measurement(values, bands, imager_of(columns), sun_distance=distance, saturated=limited)
+    found = measurement(
+        values,
+        bands,
+        imager_of(columns),
+        calibration=has_calibration_error(columns),
+        sun_distance=distance,
+        saturated=limited,
+    )
     return found if THERMAL in bands else replace(found, sun_distance=None)

@@ -114,7 +114,7 @@ def diagnostic_fields(
     matrices = {
         "posterior_covariance": ("posterior covariance of x", square),
         "averaging_kernel": ("averaging kernel of x", square),
-        "gain": ("gain of x, per measurement", ("element", "band")),
+        "gain": ("gain of x, per measurement, in C07 per W m-2 sr-1 um-1", ("element", "band")),
         "residual": ("whitened departure of the forward model from the measurement", ("band",)),
     }
     fields = {

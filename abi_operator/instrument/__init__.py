@@ -29,5 +29,6 @@ from .noise import add_noise as add_noise
 from .noise import calibration_gain as calibration_gain
 from .noise import noise_deviation as noise_deviation
 from .quantisation import quantise as quantise
+from .quantisation import rounding_deviation as rounding_deviation
 from .reflectance_factor import radiance_from_reflectance_factor as radiance_from_reflectance_factor
 from .reflectance_factor import reflectance_factor_from_radiance as reflectance_factor_from_radiance

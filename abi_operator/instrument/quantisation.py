@@ -1,5 +1,7 @@
 """Radiance as the integers of an L1b file."""
 
+import math
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -27,7 +29,24 @@ def quantise(
         Names, ``"C01"`` to ``"C07"`` and ``"GOES-16"`` for example.
     """
     scale, offset, _ = packed = packing(band, satellite)
-    unit = wavenumber_radiance_factor(band, satellite) if band == "C07" else 1.0
+    unit = _unit(band, satellite)
     count = jnp.round((radiance / unit - offset) / scale)
     count = jnp.clip(count, 0, packed.highest_count)
     return (count * scale + offset) * unit
+
+
+def rounding_deviation(band: str, satellite: str = "GOES-16") -> float:
+    r"""Standard deviation of what `quantise` rounds off, :math:`s / \sqrt{12}`.
+    [W m-2 sr-1 um-1]
+
+    Parameters
+    ----------
+    band, satellite
+        Names, ``"C01"`` to ``"C07"`` and ``"GOES-16"`` for example.
+    """
+    return packing(band, satellite).scale * _unit(band, satellite) / math.sqrt(12)
+
+
+def _unit(band: str, satellite: str) -> float:
+    """What the packed number is to be multiplied by: C07 is packed by wavenumber."""
+    return wavenumber_radiance_factor(band, satellite) if band == "C07" else 1.0

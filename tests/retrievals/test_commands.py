@@ -8,7 +8,7 @@ from readme import run_block
 from typer.testing import CliRunner
 
 from abi_operator.files import InputError, ResultWriter
-from retrievals import ResultCode
+from retrievals import ResultCode, commands
 from retrievals.commands import finish_demo, retrieve, score
 
 
@@ -100,6 +100,21 @@ def test_an_image_is_retrieved_as_a_whole(folder, run):
         assert answer.exit_code == 2 and "--smooth" in answer.stderr
     answer = run("retrieve", "fire", result, "--out", out, "--smooth", "2")
     assert answer.exit_code == 2 and "a fire is one pixel's" in answer.stderr
+
+
+def test_intervals_are_a_table_of_their_own(tmp_path):
+    """A row of scores for every quantity and share would count its pixels several times."""
+    report = xr.Dataset(
+        {
+            "bias": ("group", [0.1, 0.2]),
+            "code_count": ("code", [5]),
+            "interval_held": (("quantity", "share"), [[0.6, 0.9], [0.7, 1.0]]),
+        },
+        {"group": ["all", "aod 0 to 1"], "code": ["success"], "share": [68, 95]},
+    )
+    commands._write_csv(report, tmp_path / "scores.csv")
+    tables = (tmp_path / "scores.csv").read_text().split("\n\n")
+    assert [len(table.strip().splitlines()) for table in tables] == [3, 2, 5]
 
 
 def test_the_demonstration_ends_with_scores(folder, capsys):

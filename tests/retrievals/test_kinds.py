@@ -1,5 +1,7 @@
 """From a Dataset to a Dataset."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,6 +9,7 @@ import xarray as xr
 from abi_operator.files import InputError
 from abi_operator.nomenclature import QUALITY_FLAGS
 from retrievals import ResultCode, retrieve_kind, retrieve_smoke
+from retrievals.images import how_made, in_one_row
 from retrievals.kinds import BANDS
 
 DARK, BRIGHT, CLOUDY = 0, 1, 2  # rows of a scene
@@ -119,6 +122,23 @@ def test_what_cannot_be_asked_for_is_named(simulated):
     ):
         with pytest.raises(ValueError, match=f"one of {allowed}; got '{where}'"):
             retrieve_kind(simulated, kind, where=where)
+
+
+def test_noise_is_not_added_twice_and_is_told(simulated, retrieval):
+    noisy = simulated.assign_attrs(noise="of the instrument, seed 1", satellite="GOES-16")
+    with pytest.raises(InputError, match="the result has noise .of the instrument, seed 1.; retr"):
+        retrieve_smoke(noisy, noise=True)
+    told = how_made(noisy, ("C01",), 2, False, 0, None)
+    assert told["noise"] == "of the instrument, seed 1" and told["satellite"] == "GOES-16"
+    assert retrieval.attrs["noise"] == "none"
+
+
+def test_a_low_sun_in_one_image_is_one_of_a_sphere_in_all(columns):
+    observations, states = columns[:2]
+    low = replace(states, geometry=replace(states.geometry, spherical=True))
+    seen, joined = in_one_row([(observations, states), (observations, low)])
+    assert joined.geometry.spherical
+    assert len(joined.geometry.solar_zenith) == len(seen.measured) == 2 * len(observations.measured)
 
 
 def test_with_a_radius_nothing_is_assumed_of_the_asymmetry(simulated, monkeypatch):

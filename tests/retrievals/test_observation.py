@@ -7,9 +7,15 @@ import pytest
 import scipy
 import xarray as xr
 
-from abi_operator.instrument import Imager, observe_mean
+from abi_operator.instrument import (
+    NOISE,
+    Imager,
+    observe_mean,
+    reflectance_factor_from_radiance,
+)
 from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.planck import in_band_radiance
+from abi_operator.satellites import packing
 from retrievals.kinds import BANDS
 from retrievals.observation import (
     Observation,
@@ -104,6 +110,15 @@ def test_an_image_has_the_ceilings_of_its_satellite_and_its_sun():
     found = observe(reported, bands)
     np.testing.assert_array_equal(found.saturated[:, 0], [False, True, True])
     assert found.measured[2, 0] == 0.5
+    told = {"noise": "of the instrument, seed 1", "calibration_error": "of the instrument, seed 1"}
+    whole = observe(reported.assign_attrs(told | {"quantised": 1}), bands)
+    gains = [NOISE.calibration[band] for band in bands]
+    steps = [
+        reflectance_factor_from_radiance(jnp.asarray(packing(b, "GOES-18").scale), b, "GOES-18")
+        for b in bands
+    ]
+    squares = found.sigma**2 + (gains * found.measured) ** 2 + np.array(steps) ** 2 / 12
+    np.testing.assert_allclose(whole.sigma, np.sqrt(squares), rtol=1e-12)
 
 
 def test_no_noise_changes_what_is_saturated():
