@@ -120,7 +120,7 @@ def _shining(states: State, flags: np.ndarray, band: str) -> np.ndarray:
 
 def _with_no_fire(states: State) -> State:
     """Columns that shine by their ground alone in C05 and C06, too."""
-    none = np.zeros_like(np.asarray(states.geometry.solar_zenith))
+    none: Any = np.zeros_like(np.asarray(states.geometry.solar_zenith))
     return dataclasses.replace(states, fire=Fire(none, none + _HARMLESS))
 
 
