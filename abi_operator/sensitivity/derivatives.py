@@ -1,6 +1,7 @@
 """Sensitivities of any function of the operator's output to any inputs, column by column."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
@@ -30,8 +31,9 @@ class Sensitivity(NamedTuple):
     jacobian
         Exact derivatives (column, of, to), in the units of the inputs.
     elasticity
-        Relative change of a number for a relative change of an input (column, of, to), the
-        Jacobian times input over number. [-]
+        Relative change of a number for a relative change of an input (column, of, to): the
+        Jacobian times input over number, and of an input of several numbers (an albedo in all
+        bands) the slope for one share of each of them, over number. [-]
     up, down
         Exact changes for a step of each input up and down (column, of, to); NaN where the column
         may not be so (a single-scattering albedo above 1).
@@ -74,12 +76,18 @@ def sensitivity(
     if not inputs:
         raise ValueError("there is no input to be sensitive to; name at least one.")
     rows = rows_of(function)
-    value, jacobian = slopes(rows, states, inputs, None)
+    # Along with the others, since what they change is the same: one program has them all.
+    shares = {k: one.relative for k, one in enumerate(inputs) if one.relative is not None}
+    by_share = [replace(inputs[k], change=relative(states)) for k, relative in shares.items()]
+    value, along = slopes(rows, states, [*inputs, *by_share], None)
+    jacobian = along[..., : len(inputs)]
     own = np.stack([np.asarray(one.value(states)) for one in inputs], axis=-1)
     steps = np.array([one.step for one in inputs], value.dtype)
     up, down = (finite_changes(rows, states, inputs, sign * steps, value) for sign in (1, -1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        elasticity = jacobian * own[:, None] / value[..., None]
+        relative = jacobian * own[:, None]
+        relative[..., list(shares)] = along[..., len(inputs) :]
+        elasticity = relative / value[..., None]
     second = np.full((*jacobian.shape, len(inputs)), np.nan, value.dtype)
     if second_order:
         for k, one in enumerate(inputs):

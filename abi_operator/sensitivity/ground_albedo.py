@@ -4,6 +4,7 @@ A ground that reflects unevenly has more numbers than its albedo (weights of ker
 share of water), none of which is to be moved with it: it is made brighter to all sides alike.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -43,6 +44,17 @@ def albedo(band: str | None = None, step: float = 0.01) -> Input:
         moved = {name: brightened(ground, by) for name, ground in grounds(state).items()}
         return replace(state, albedo={**state.albedo, **moved})
 
+    def relative(state: State) -> Callable[[State, Array], State]:
+        # Of concrete numbers, as albedos of seas are found from; slopes are along them.
+        own = {name: white_sky_albedo(ground) for name, ground in grounds(state).items()}
+
+        def change(state: State, by: Array) -> State:
+            there = grounds(state)
+            moved = {name: brightened(there[name], by * own[name]) for name in there}
+            return replace(state, albedo={**state.albedo, **moved})
+
+        return change
+
     def value(state: State) -> Array:
         found = [white_sky_albedo(ground) for ground in grounds(state).values()]
         return jnp.mean(jnp.stack(found, axis=-1), axis=-1)
@@ -53,7 +65,9 @@ def albedo(band: str | None = None, step: float = 0.01) -> Input:
 
     name = "albedo" if band is None else f"albedo_{band}"
     where = "in all bands" if band is None else f"in {band} alone"
-    return Input(name, "1", f"albedo of the ground {where}", step, change, value, holds)
+    words = f"albedo of the ground {where}"
+    by_share = relative if band is None else None
+    return Input(name, "1", words, step, change, value, holds, by_share)
 
 
 def white_sky_albedo(ground: Any) -> Array:

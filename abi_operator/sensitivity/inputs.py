@@ -39,6 +39,9 @@ class Input:
         From a state to what the change is added to, in the unit: of several numbers their mean.
     holds
         From a changed state to whether each column may be so.
+    relative
+        From a state to a change of it, as ``change``, by a share of each number and not by one
+        number for all; None where the input is one number, or what is changed is a share already.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Input:
     change: Callable[[State, Array], State]
     value: Callable[[State], Array]
     holds: Callable[[State], np.ndarray]
+    relative: Callable[[State], Callable[[State, Array], State]] | None = None
 
     def stepping(self, step: float) -> "Input":
         """The same with another step."""
@@ -91,14 +95,17 @@ def leaf(
     scale
         Size of the unit in that of the state, such as that of a degree in radians.
     """
-    return several((place,), added, step, name or place, units, long_name, scale)
+    found = several((place,), added, step, name or place, units, long_name, scale)
+    by_share = factor(place, step).change
+    return replace(found, relative=lambda _state: by_share)
 
 
 def factor(
     place: str, step: float, *, name: str | None = None, long_name: str | None = None
 ) -> Input:
     """Relative change of every number at a place; its value is 1."""
-    found = several((place,), _multiplied, step, name or place, "1", long_name, 1.0)
+    words = long_name or f"relative change of {place}"
+    found = several((place,), _multiplied, step, name or place, "1", words, 1.0)
     return replace(found, value=_one)
 
 

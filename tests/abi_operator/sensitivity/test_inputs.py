@@ -59,6 +59,7 @@ def test_a_leaf_is_declared_by_its_place(states):
         ours, theirs = (getattr(x.atmosphere.liquid, name) for x in (step, states))
         np.testing.assert_allclose(ours, 1.1 * theirs, rtol=1e-12)
     assert declared("atmosphere.pressure").units == "1"
+    assert "relative" in declared("albedo.C03").long_name
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +96,20 @@ def test_albedo_is_that_of_any_ground(uneven, name, bands):
     assert one.holds(uneven).all() and one.holds(step).all()
     assert one.holds(moved(uneven, one, -one.step)).tolist() == [False] + 5 * [True]
     assert not one.holds(moved(uneven, one, 1.0)).any()
+
+
+def test_a_share_of_an_albedo_is_one_in_every_band(uneven):
+    """Of any ground; in Lambertian ones, and of leaves, each number is multiplied."""
+    by = jnp.full(6, 0.1)
+    bright = declared("albedo").relative(uneven)(uneven, by)
+    for band in uneven.albedo:
+        own, more = of_sky(uneven.albedo[band]), of_sky(bright.albedo[band])
+        np.testing.assert_allclose(more, 1.1 * own, atol=1e-8)
+    plain = replace(uneven, albedo={"C02": np.full(6, 0.1), "C03": np.full(6, 0.3)})
+    for one in (declared("albedo"), leaf("albedo", 0.01)):
+        bright = one.relative(plain)(plain, by).albedo
+        np.testing.assert_allclose(np.stack(list(bright.values())), [[0.11] * 6, [0.33] * 6])
+    assert declared("albedo_C03").relative is None and declared("liquid_mass").relative is None
 
 
 def test_what_there_is_not_is_told(states):
