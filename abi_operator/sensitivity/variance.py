@@ -64,11 +64,14 @@ def covariance_of(
     Raises
     ------
     ValueError
-        Where a name is none of the inputs', or these correlations cannot be.
+        Where a name is none of the inputs' or is given twice, or these correlations cannot be.
     """
     names = [one.name for one in inputs]
+    check_once("input", names)
     matrix = np.eye(len(names))
-    for pair, correlation in (correlations or {}).items():
+    given = correlations or {}
+    check_once("correlation", [" and ".join(sorted(pair)) for pair in given])
+    for pair, correlation in given.items():
         unknown = [name for name in pair if name not in names]
         if unknown or pair[0] == pair[1]:
             raise ValueError(f"a correlation is of two of {', '.join(names)}; got {pair}.")
@@ -79,20 +82,39 @@ def covariance_of(
 
 
 def checked_covariance(covariance: np.ndarray, size: int) -> np.ndarray:
-    """Return a covariance, or raise `ValueError` where it is none of so many inputs."""
+    """Return a covariance, or raise `ValueError` where it is none of so many inputs.
+
+    It is judged by its correlations, which do not hang on the units of the inputs.
+    """
     covariance = np.asarray(covariance)
-    if covariance.shape != (size, size) or not np.allclose(covariance, covariance.T):
+    square = covariance.shape == (size, size)
+    _, correlations = _standardized(covariance) if square else (None, covariance)
+    if not square or not np.allclose(correlations, correlations.T):
         raise ValueError(
             f"the covariance of {size} inputs is symmetric, ({size}, {size}); got "
             f"{covariance.shape}."
         )
-    smallest, *_, largest = [*np.linalg.eigvalsh(covariance), np.trace(covariance)]
-    if smallest < -1e-12 * largest:
+    smallest = np.linalg.eigvalsh(correlations)[0]
+    if smallest < -1e-12 * size:
         raise ValueError(
-            "these correlations cannot be: some combination of the inputs had a variance of "
-            f"{smallest:.3g}."
+            "these correlations cannot be: some combination of the inputs, each in standard "
+            f"deviations, had a variance of {smallest:.3g}."
         )
     return covariance
+
+
+def _standardized(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations (to,), 1 for those of 0, and the covariance in units of them."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0))
+    sigma = np.where(sigma > 0, sigma, 1)
+    return sigma, covariance / sigma[:, None] / sigma
+
+
+def check_once(what: str, names: Sequence[str]) -> None:
+    """Raise `ValueError` where a name is there twice."""
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise ValueError(f"each {what} is given once; got {', '.join(twice)} more often.")
 
 
 def variance_parts(
@@ -115,7 +137,8 @@ def sampled_variance(
 ) -> SampledVariance:
     """Variance and its parts by normal draws of the inputs, other ones for each column.
 
-    Draws by which a column may not be changed are left out, and told by `draws`.
+    Draws by which a column may not be changed are left out, and told by `draws`; what fewer than
+    two are left of has no variance, NaN.
 
     Parameters
     ----------
@@ -137,8 +160,9 @@ def sampled_variance(
         raise ValueError(f"a variance needs 2 samples or more; got {num_samples}.")
     covariance, rows = checked_covariance(covariance, len(inputs)), rows_of(function)
     columns = jacobian.shape[0]
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0))
+    sigma, correlations = _standardized(covariance)
+    values, vectors = np.linalg.eigh(correlations)
+    root = sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0))
     rng = np.random.default_rng(seed)
     draws = rng.standard_normal((num_samples, columns, len(inputs))) @ root.T
     draws = draws.astype(jacobian.dtype)
@@ -180,10 +204,11 @@ def _moments(
     products = off[..., None] * first
     parts, linear = mean(products), mean(np.sum(first, axis=-1) ** 2)
     spread = np.maximum(mean(products**2) - parts**2, 0) / np.maximum(count, 1)[:, None, None]
-    parts = parts * unbiased[..., None]
-    return SampledVariance(
-        total * unbiased, error, linear * unbiased, parts, np.sqrt(spread), count
-    )
+    parts, spread = parts * unbiased[..., None], np.sqrt(spread)
+    found = total * unbiased, error, linear * unbiased, parts, spread
+    for some in found:
+        some[count < 2] = np.nan
+    return SampledVariance(*found, count)
 
 
 def _repeated(states: State, times: int) -> State:
