@@ -63,7 +63,7 @@ def surrounding_mean(
     if field.ndim < 2:
         raise ValueError(f"a picture has axes y and x; got a field of shape {field.shape}.")
     xp = namespace(field, fire)
-    usable = ~((fire != 0) | xp.isnan(field))  # of a mask of bytes, too
+    usable = ~(fire.astype(bool) | xp.isnan(field))  # of a mask of bytes, too
     total = _box_sum(xp, xp.where(usable, field, 0), half_width)
     count = _box_sum(xp, usable.astype(field.dtype), half_width)
     some = count > 0

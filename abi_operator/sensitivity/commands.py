@@ -1,7 +1,7 @@
 """The commands ``abi-operator nir-test``, ``sensitivity`` and ``figure``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 import xarray as xr
@@ -97,7 +97,7 @@ def sensitivity(
         typer.Option(
             help=f"What is changed, by commas: {', '.join(SHORT_NAMES)}; of one band "
             f"{', '.join(f'{name}_C03' for name in BY_BAND)}; or a path in the state, such as "
-            "atmosphere.gases.methane."
+            "atmosphere.gases.methane, which is changed by a factor."
         ),
     ],
     out: Annotated[Path, _OUT],
@@ -111,7 +111,8 @@ def sensitivity(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Step and standard deviation of an input, in place of the declared one.",
+            help="Step and standard deviation of an input, in place of the declared one; of a path "
+            "in the state relative, as it is changed by a factor.",
         ),
     ] = None,
     correlation: Annotated[
@@ -147,8 +148,8 @@ def sensitivity(
             _names(to),
             species=species,
             where=where,  # pyright: ignore[reportArgumentType]
-            sigma=dict(_pair(text, "--sigma") for text in sigma or []),
-            correlations=dict(_correlation(text) for text in correlation or []),
+            sigma=_once([_pair(text, "--sigma") for text in sigma or []], "--sigma"),
+            correlations=_once([_correlation(text) for text in correlation or []], "--correlation"),
             fire=_fire(fire),
             second_order=second_order,
             sampling=Sampling(samples, sampled_pixels, seed),
@@ -188,9 +189,7 @@ def figure(
         with output_folder(out) as folder:
             write_panels(folder / f"{name}.png", drawn.panels, drawn.columns, drawn.caption)
             if drawn.fields:
-                fields = {x: (("y", "x"), y, {"units": "1"}) for x, y in drawn.fields.items()}
-                maps = xr.Dataset(fields, {x: image[x] for x in ("latitude", "longitude")})
-                maps.attrs |= {"title": drawn.caption, "history": history(context, image)}
+                maps = drawn.maps(image).assign_attrs(history=history(context, image))
                 write_dataset(maps, folder / f"{name}.nc")
     typer.echo(f"wrote {out / name}.png")
     if drawn.fields:
@@ -226,6 +225,14 @@ def _pair(text: str, option: str) -> tuple[str, float]:
         raise InputError(f"{option} takes NAME=VALUE with a number; got {text!r}.") from None
 
 
+def _once(pairs: list[tuple[Any, float]], option: str) -> dict[Any, float]:
+    """Numbers by what they are of, which an option gives once."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise InputError(f"{option} takes each name or pair once; got one of them more often.")
+    return found
+
+
 def _correlation(text: str) -> tuple[tuple[str, str], float]:
     names, value = _pair(text, "--correlation")
     first, _, second = (name.strip() for name in names.partition(","))
@@ -259,4 +266,6 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write maps as NetCDF."""
     compressed = {name: {"zlib": True, "complevel": 1} for name in dataset.data_vars}
     unfilled = {name: {"_FillValue": None} for name in dataset.coords}
-    dataset.to_netcdf(path, engine="netcdf4", encoding=compressed | unfilled)
+    # A projection is named as such, and not among the coordinates.
+    named = dataset.reset_coords([name for name in ("crs",) if name in dataset.coords])
+    named.to_netcdf(path, engine="netcdf4", encoding=compressed | unfilled)

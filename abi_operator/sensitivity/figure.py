@@ -4,8 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
+from ..files.result import CONVENTIONS
 from .panels import Panel
+from .place import with_place
 
 
 class Figure(NamedTuple):
@@ -30,3 +33,12 @@ class Figure(NamedTuple):
     lines: Sequence[str]
     fields: Mapping[str, np.ndarray]
     caption: str
+
+    def maps(self, image: xr.Dataset) -> xr.Dataset:
+        """The maps where and when the result is that they were made of."""
+        fields = {
+            name: (("y", "x"), values, {"units": "1", "long_name": name.replace("_", " ")})
+            for name, values in self.fields.items()
+        }
+        attributes = {"Conventions": CONVENTIONS, "title": self.caption}
+        return with_place(xr.Dataset(fields, attrs=attributes), image)

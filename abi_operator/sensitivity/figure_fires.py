@@ -44,11 +44,17 @@ class ByHour(NamedTuple):
 
     @property
     def lowest(self) -> np.ndarray:
-        """Temperature (hour, albedo) from which contrast exceeds `SHOWS`, or NaN. [K]"""
+        """Temperature (hour, albedo) from which contrast exceeds `SHOWS`. [K]
+
+        NaN where not even the hottest fire does, and -inf where the coolest does: from which on
+        below it nothing tells.
+        """
         found = np.full(self.contrast.shape[:2], np.nan)
         for index in np.ndindex(*found.shape):
             rising = np.log(np.maximum(self.contrast[index], 1e-12))
-            if rising[-1] > np.log(SHOWS):
+            if rising[0] > np.log(SHOWS):
+                found[index] = -np.inf
+            elif rising[-1] > np.log(SHOWS):
                 found[index] = np.interp(np.log(SHOWS), rising, TEMPERATURES)
         return found
 
@@ -114,11 +120,11 @@ def fires_figure(image: xr.Dataset, fire: Fire) -> Figure:
         f"{'UTC':>6} {'sun':>6} " + " ".join(f"{name:>9}" for name in names),
     ]
     for hour, zenith, row in zip(found.hours, found.solar_zenith, lowest, strict=True):
-        lines.append(f"{hour:6.1f} {zenith:6.1f} " + " ".join(f"{x:9.0f}" for x in row))
+        lines.append(f"{hour:6.1f} {zenith:6.1f} " + " ".join(f"{_said(x):>9}" for x in row))
     log = np.log10(np.maximum(found.contrast[noon], 1e-6))
     highest = f"sun {found.solar_zenith[noon]:.0f}° from the zenith"
     by_heat = dict(zip(names, log, strict=True))
-    by_hour = dict(zip(names, lowest.T, strict=True))
+    by_hour = dict(zip(names, np.maximum(lowest, TEMPERATURES[0]).T, strict=True))
     panels = [
         curves(f"By temperature [K], {highest}", TEMPERATURES, by_heat, -2, 2, "log10 of contrast"),
         curves(
@@ -132,6 +138,11 @@ def fires_figure(image: xr.Dataset, fire: Fire) -> Figure:
     ]
     caption = f"One column without cloud or plume; a fire shows from a contrast of {SHOWS:g} on."
     return Figure(panels, 2, lines, {}, caption)
+
+
+def _said(temperature: float) -> str:
+    """One of `ByHour.lowest` in words."""
+    return f"<{TEMPERATURES[0]:.0f}" if temperature == -np.inf else f"{temperature:.0f}"
 
 
 def _clear_place(image: xr.Dataset) -> np.ndarray:

@@ -5,13 +5,14 @@ from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
 from ..atmosphere import Fire, State
 from ..files import InputError
 from ..plume_edges import moves_plume_edges
-from ..scene import gases_of, species_of, states_of_result
+from ..scene import gases_of, species_of, states_of_result, sun_path_of
 from ..scene.angles import sun_distance
 from ..settings import Settings, streams_of_attributes
 from .declarations import declared
@@ -20,7 +21,7 @@ from .inputs import Input, changed
 from .outputs import FIRE_CONTRAST, bands_of, check_outputs, output_function
 from .result_checks import DARK, check_result, of_columns
 from .study_dataset import SampledPixels, study_dataset
-from .variance import covariance_of, sampled_variance
+from .variance import check_once, covariance_of, sampled_variance
 
 STANDARD_TEMPERATURE = 288.15
 """Of ground and air where a result has none and a fire is added: what they give off themselves is
@@ -62,7 +63,8 @@ def sensitivity_study(
 ) -> xr.Dataset:
     """Sensitivities of a scene's image to what is in the scene, in float64.
 
-    Where an edge of a plume is changed, columns have levels that go with it (`with_plume_edges`).
+    Where an edge of a plume is changed, columns have levels that go with it (`with_plume_edges`);
+    where the sun is moved, its path is that of where it is moved to.
 
     Parameters
     ----------
@@ -100,10 +102,15 @@ def sensitivity_study(
     Raises
     ------
     InputError
-        Where the result lacks something, or a name is unknown.
+        Where the result lacks something, a name is unknown or given twice, or one sample is to tell
+        a variance.
     """
+    sampling = sampling or Sampling()
     try:
+        if sampling.num_samples == 1:
+            raise ValueError("a variance needs 2 samples or more, or 0 for no check; got 1.")
         of = check_outputs(of)
+        check_once("output", of)
         species = _species(image, species)
         check_result(image, of_columns(image), bands_of(of))
         inputs = [_input(one, species, sigma or {}) for one in to]
@@ -113,17 +120,44 @@ def sensitivity_study(
         with jax.enable_x64(True):
             covariance = covariance_of(inputs, correlations)
             chosen = chosen_pixels(image, species, where)
-            states = states_of(image, chosen, of, fire)
+            states = _under_a_moving_sun(image, states_of(image, chosen, of, fire), inputs)
             how = settings_of_result(image)
             first = jax.tree.map(lambda leaf: leaf[:1], states)
             if moves_plume_edges(lambda x: changed(first, inputs, x[None]), len(inputs)):
                 how = how._replace(plume_edges=True)
             function = output_function(of, how, sun_distance_of(image))
             found = sensitivity(function, states, inputs, second_order=second_order)
-            sampled = _sampled(function, states, inputs, found, covariance, sampling or Sampling())
+            sampled = _sampled(function, states, inputs, found, covariance, sampling)
     except ValueError as error:
         raise InputError(str(error)) from None
-    return study_dataset(image, chosen, (of, inputs), found, covariance, sampled)
+    said = _said_of_result(image) | {"where": where}
+    said |= {} if species is None else {"species": species}
+    said |= {"fire": _in_words(fire)} if FIRE_CONTRAST in of else {}
+    said |= {} if sampled is None else {"samples": sampling.num_samples, "seed": sampling.seed}
+    return study_dataset(image, chosen, (of, inputs), found, covariance, sampled, said)
+
+
+def _said_of_result(image: xr.Dataset) -> dict[str, Any]:
+    """How a result was simulated, in its own attributes."""
+    names = "satellite", "gases", "num_streams", "streams_error", "sun_path"
+    return {name: image.attrs[name] for name in names if name in image.attrs}
+
+
+def _in_words(fire: Fire) -> str:
+    return f"{float(fire.fraction):g} of each pixel at {float(fire.temperature):g} K"
+
+
+def _under_a_moving_sun(image: xr.Dataset, states: State, inputs: Sequence[Input]) -> State:
+    """States whose sun has a sphere's layers at hand where a step of an input moves it.
+
+    A result's columns have them only where the sun is low as they are, and a step may lower it.
+    """
+    geometry, count = states.geometry, states.geometry.solar_zenith.shape[0]
+    steps = jnp.tile(jnp.array([one.step for one in inputs]), (count, 1))
+    moved = np.asarray(changed(states, inputs, steps).geometry.solar_zenith)
+    if sun_path_of(image) != "spherical" or (moved == np.asarray(geometry.solar_zenith)).all():
+        return states
+    return replace(states, geometry=replace(geometry, spherical=True))
 
 
 def _sampled(

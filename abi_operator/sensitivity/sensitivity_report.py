@@ -34,6 +34,9 @@ class Ranked(NamedTuple):
         squared.
     share
         Of the variance, the input's part of the mean variance. [-]
+    pixels
+        That all means but the share are over: those whose slope, changes and second derivative are
+        numbers, so that these may be compared.
     """
 
     of: str
@@ -46,6 +49,7 @@ class Ranked(NamedTuple):
     down: float
     second: float
     share: float
+    pixels: int
 
 
 def ranking(study: xr.Dataset) -> list[Ranked]:
@@ -58,13 +62,14 @@ def ranking(study: xr.Dataset) -> list[Ranked]:
         for to in study["to"].values:
             one = some.sel(to=to)
             step = float(one["step"])
-            names = ("jacobian", "elasticity", "change_up", "change_down")
-            slope, elasticity, up, down = (_mean(one[name]) for name in names)
-            second = _mean(one["second_derivative"]) * step**2 / 2
+            where = _compared(one)
+            names = ("jacobian", "elasticity", "change_up", "change_down", "second_derivative")
+            slope, elasticity, up, down, second = (_mean(one[name], where) for name in names)
+            second *= step**2 / 2
             share = _mean(one["variance_part"]) / total if total else 0.0
             units = str(one["to_units"].values)
             means = (slope, elasticity, up, down, second, share)
-            found.append(Ranked(str(of), str(to), units, step, *means))
+            found.append(Ranked(str(of), str(to), units, step, *means, int(where.sum())))
         rows += sorted(found, key=lambda row: -abs(row.share))
     return rows
 
@@ -76,12 +81,13 @@ def report_lines(study: xr.Dataset) -> list[str]:
     for of in study["of"].values:
         value = study["value"].sel(of=of)
         low, high = np.nanpercentile(value.values, [5, 95])
+        pixels = int(np.isfinite(value.values).sum())
         lines.append(
             f"{of}: mean {_mean(value):.5g}, 5th to 95th percentile {low:.4g} to {high:.4g}, "
-            f"{int(np.isfinite(value.values).sum())} pixels"
+            f"{pixels} pixels"
         )
         lines.append(f"  {'':{width}} " + " ".join(f"{title:>10}" for title in _HEAD))
-        lines += [f"  {_line(row, width)}" for row in rows if row.of == of]
+        lines += [f"  {_line(row, width, pixels)}" for row in rows if row.of == of]
         lines += [f"  {line}" for line in check_lines(study.sel(of=of))]
     return lines
 
@@ -127,12 +133,26 @@ def write_picture(path: str | PathLike[str], study: xr.Dataset) -> None:
     write_panels(path, panels, columns=study.sizes["to"], caption=caption)
 
 
-def _line(row: Ranked, width: int) -> str:
+def _line(row: Ranked, width: int, pixels: int) -> str:
     numbers = (row.jacobian, row.elasticity, row.up, row.down, row.second)
     cells = " ".join(f"{x:>+10.3g}" if np.isfinite(x) else f"{'-':>10}" for x in numbers)
-    return f"{row.to:{width}} {row.step:>10.3g} {row.units:>10} {cells} {100 * row.share:>8.1f} %"
+    fewer = f"  (changes of {row.pixels} pixels)" if row.pixels < pixels else ""
+    share = f"{100 * row.share:>8.1f} %"
+    return f"{row.to:{width}} {row.step:>10.3g} {row.units:>10} {cells} {share}{fewer}"
 
 
-def _mean(array: xr.DataArray) -> float:
-    values = array.values[np.isfinite(array.values)]
+def _compared(one: xr.Dataset) -> np.ndarray:
+    """Pixels (y, x) of which slope and changes are numbers, without those that are none anywhere.
+
+    A step that leads out of the allowed range in some pixels has a change in the others alone, of
+    which the slope may be another; second derivatives may not have been asked for.
+    """
+    slope = np.isfinite(one["jacobian"].values)
+    others = ("change_up", "change_down", "second_derivative")
+    finite = [np.isfinite(one[name].values) for name in others]
+    return np.all([slope, *(some for some in finite if some.any())], axis=0)
+
+
+def _mean(array: xr.DataArray, where: np.ndarray | bool = True) -> float:
+    values = array.values[np.isfinite(array.values) & where]
     return float(values.mean()) if values.size else float("nan")

@@ -1,7 +1,7 @@
 """The maps of a sensitivity study: names, dimensions and words of all that was found."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -27,6 +27,7 @@ def study_dataset(
     found: Sensitivity,
     covariance: np.ndarray,
     sampled: SampledPixels | None,
+    how: Mapping[str, Any],
 ) -> xr.Dataset:
     """Maps of what was found of some pixels of an image.
 
@@ -38,6 +39,8 @@ def study_dataset(
         What was looked at, and the inputs.
     found, covariance, sampled
         Of these pixels in a row; the covariance of the inputs; None where nothing was drawn.
+    how
+        Attributes that say how it was found.
     """
     of, inputs = names
     rows, entries = ("of", "y", "x"), ("of", "to", "y", "x")
@@ -89,7 +92,7 @@ def study_dataset(
     result = xr.Dataset(variables, coordinates)
     result = with_place(result, image)
     return result.assign_attrs(
-        {"Conventions": CONVENTIONS, "title": "Sensitivities of a scene's synthetic imagery"}
+        {"Conventions": CONVENTIONS, "title": "Sensitivities of a scene's synthetic imagery", **how}
     )
 
 

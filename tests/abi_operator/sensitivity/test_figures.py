@@ -5,6 +5,7 @@ import importlib
 import numpy as np
 import pytest
 import xarray as xr
+from conventions import complaints
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -19,6 +20,7 @@ from abi_operator.sensitivity.nir_study import brf_by_band
 from abi_operator.sensitivity.panels import curves, scatter
 
 FIRE = Fire(0.04, 800.0)
+figure_fires = importlib.import_module("abi_operator.sensitivity.figure_fires")
 figure_albedo = importlib.import_module("abi_operator.sensitivity.figure_albedo")
 
 
@@ -78,6 +80,11 @@ def test_the_command_draws_green(result_file, image, tmp_path, monkeypatch):
     assert line in outcome.output
     # The air makes up for most of what the recipe lacks of the grounds' own green.
     assert abs(off.mean()) < 0.02
+    with xr.open_dataset(tmp_path / "out" / "green.nc") as maps:
+        assert maps["green_derived"].attrs["grid_mapping"] == "crs" not in maps.coords
+        assert maps["time"].values == image["time"].values
+        assert maps["x"].values.tolist() == image["x"].values.tolist()
+    assert complaints(tmp_path / "out" / "green.nc") == []
     with Image.open(tmp_path / "out" / "green.png") as picture:
         assert picture.width > 2 * 384
     outcome = CliRunner().invoke(cli.make_app(), ["figure", "grin", *words[2:]])
@@ -203,6 +210,19 @@ def test_fires_show_over_dark_grounds_and_by_a_low_sun(image):
     assert abs(at - np.log(SHOWS)) < 1e-9
     lines = fires_figure(image, FIRE).lines
     assert len(lines) == 2 + len(found.hours) and len(lines[-1].split()) == 2 + len(ALBEDOS)
+
+
+def test_fires_that_all_show_are_not_said_to_show_from_the_coolest_on(monkeypatch):
+    contrast = np.ones((2, len(ALBEDOS), len(TEMPERATURES)))
+    contrast[1] = SHOWS * TEMPERATURES / 500
+    contrast[1, -1] = 0.01
+    found = figure_fires.ByHour(np.array([18.0, 18.5]), np.array([30.0, 40.0]), contrast)
+    assert (found.lowest[0] == -np.inf).all() and np.isnan(found.lowest[1, -1])
+    np.testing.assert_allclose(found.lowest[1, :-1], 500)
+    monkeypatch.setattr(figure_fires, "fires_by_hour", lambda *_: found)
+    lines = fires_figure(xr.Dataset(), FIRE).lines
+    assert lines[2].split()[2:] == 5 * ["<400"]
+    assert lines[3].split()[2:] == [*4 * ["500"], "nan"]
 
 
 def test_what_a_figure_lacks_is_told(image):

@@ -200,6 +200,7 @@ def test_it_writes_maps_a_table_and_a_picture(invoke, result_file, tmp_path):
         counted = maps["counted"].values > 0
         changes = 100 * maps["green_change"].sel(recipe="grasso2013", change=0.1).values[counted]
         assert "--pixel-by-pixel" in maps.attrs["history"]
+        assert {maps[name].attrs["grid_mapping"] for name in ("green", "ssa")} == {"crs"}
     assert complaints(tmp_path / "out" / "nir_test.nc") == []
     assert f"{short} pixels fall short with 1, which they keep" in outcome.output
     assert f"counted: {counted.sum()} without cloud" in outcome.output

@@ -9,8 +9,15 @@ from typer.testing import CliRunner
 
 from abi_operator import cli
 from abi_operator.files import InputError
-from abi_operator.sensitivity import Sampling, sensitivity_study
+from abi_operator.sensitivity import Sampling, declared, sensitivity_study
 from abi_operator.sensitivity.nir_study import brf_by_band
+from abi_operator.sensitivity.scene_study import (
+    DEFAULT_FIRE,
+    _under_a_moving_sun,
+    chosen_pixels,
+    states_of,
+)
+from abi_operator.sensitivity.sensitivity_report import ranking, report_lines
 
 
 @pytest.fixture
@@ -29,7 +36,13 @@ def test_it_writes_maps_a_ranking_and_a_picture(invoke, result_file, image, tmp_
     names = ["sensitivity.csv", "sensitivity.nc", "sensitivity.png"]
     assert sorted(path.name for path in out.iterdir()) == names
     inside = image["ash_brightness"].values > 0
+    assert complaints(out / "sensitivity.nc") == []
     with xr.open_dataset(out / "sensitivity.nc") as maps:
+        for name in ("value", "jacobian", "sample_count"):
+            assert maps[name].attrs["grid_mapping"] == "crs"
+        said = {"species": "ash", "where": "plume", "satellite": "GOES-16", "gases": "none"}
+        said |= {"num_streams": 2, "samples": 20, "seed": 0}
+        assert said.items() <= maps.attrs.items() and "fire" not in maps.attrs
         value = maps["value"].sel(of="C03").values
         np.testing.assert_allclose(value[inside], brf_by_band(image)["C03"][inside], rtol=1e-12)
         assert np.isnan(value[~inside]).all()
@@ -60,6 +73,7 @@ def test_fires_are_put_into_a_scene_without_temperatures(invoke, result_file, tm
         some = maps.sel(of="fire_contrast")
         inside = np.isfinite(some["value"].values)
         assert (some["value"].values[inside] > 0).all()
+        assert maps.attrs["fire"] == "0.01 of each pixel at 900 K" and "samples" not in maps.attrs
         elasticity = some["elasticity"].sel(to="fire_fraction").values[inside]
         np.testing.assert_allclose(elasticity, 1, atol=1e-2)
         assert (some["jacobian"].sel(to="albedo").values[inside] < 0).all()
@@ -73,6 +87,44 @@ def test_all_pixels_and_no_check(image):
     assert "sampled_variance" not in study and np.isnan(study["second_derivative"]).all()
 
 
+def test_an_elasticity_is_the_same_whatever_else_is_looked_at(image):
+    """On a ground, and of ash, that differ by band."""
+    how = {"second_order": False, "sampling": Sampling(0)}
+    alone, both = (
+        sensitivity_study(image, of, ["ssa", "albedo"], **how)["elasticity"].sel(of="C03").values
+        for of in (["C03"], ["C03", "green"])
+    )
+    good = np.isfinite(alone)
+    assert good.any() and (good == np.isfinite(both)).all()
+    np.testing.assert_allclose(both[good], alone[good], rtol=1e-9)
+
+
+def test_the_suns_path_goes_with_a_sun_that_is_moved(image):
+    states = states_of(image, chosen_pixels(image, None, "all"), ("C03",), DEFAULT_FIRE)
+    flat, moving = image.assign_attrs(sun_path="flat"), declared("solar_zenith")
+    assert image.attrs["sun_path"] == "spherical" and not states.geometry.spherical
+    assert _under_a_moving_sun(image, states, [moving]).geometry.spherical
+    assert not _under_a_moving_sun(flat, states, [moving]).geometry.spherical
+    others = [declared(name, "ash") for name in ("ssa", "view_zenith")]
+    assert not _under_a_moving_sun(image, states, others).geometry.spherical
+
+
+def test_changes_that_are_ranked_are_of_the_same_pixels():
+    """Of a straight line, half of whose pixels may not go down by the step."""
+    slope, dims = np.arange(1.0, 5.0).reshape(2, 2), ("of", "to", "y", "x")
+    down = np.where(slope < 3, -0.1 * slope, np.nan)
+    fields = {"jacobian": slope, "elasticity": slope, "change_up": 0.1 * slope, "change_down": down}
+    fields |= {"second_derivative": np.full((2, 2), np.nan), "variance_part": slope**2}
+    maps = {name: (dims, values[None, None]) for name, values in fields.items()}
+    maps |= {name: (("of", "y", "x"), slope[None] ** 2) for name in ("value", "variance")}
+    labels = {"of": ["C03"], "to": ["ssa"], "to_units": ("to", ["1"]), "step": ("to", [0.1])}
+    study = xr.Dataset(maps, labels)
+    (row,) = ranking(study)
+    assert row.up == -row.down == pytest.approx(row.jacobian * row.step)
+    assert row.pixels == 2 and np.isnan(row.second) and row.share == 1
+    assert "(changes of 2 pixels)" in report_lines(study)[2]
+
+
 @pytest.mark.parametrize(
     "words, sentence",
     [
@@ -81,6 +133,14 @@ def test_all_pixels_and_no_check(image):
         (("--of", "C03", "--to", "ssa", "--species", "smoke"), "no plume of smoke"),
         (("--of", "C03", "--to", "ssa", "--sigma", "ssa"), "--sigma takes NAME=VALUE"),
         (("--of", "C03", "--to", "ssa", "--sigma", "albedo=1"), "sigma of albedo is given"),
+        (("--of", "C03", "--to", "ssa,ssa"), "each input is given once; got ssa"),
+        (("--of", "C03,C03", "--to", "ssa"), "each output is given once; got C03"),
+        (("--of", "C03", "--to", "ssa", *2 * ("--sigma", "ssa=1")), "--sigma takes each name"),
+        (
+            ("--of", "C03", "--to", "ssa,albedo", *2 * ("--correlation", "ssa,albedo=0.1")),
+            "--correlation takes each name or pair once",
+        ),
+        (("--of", "C03", "--to", "ssa", "--samples", "1"), "2 samples or more, or 0 for no check"),
         (("--of", "fire_contrast", "--to", "ssa", "--fire", "hot"), "--fire takes a share"),
         (("--of", "C03", "--to", "ssa", "--where", "sea"), "'plume' or 'all'; got 'sea'"),
     ],
