@@ -158,8 +158,10 @@ def _named(file: xr.Dataset, path: object) -> list[Found]:
         band, source = (
             (MODIS[name], f"{label} of MODIS") if name in MODIS else (name.upper(), label)
         )
-        is_brf = _IS_BRF.get(match["quantity"])
-        found.append(Found(band, _plane(file, label, path), is_brf, source))
+        is_brf, values = _IS_BRF.get(match["quantity"]), _plane(file, label, path)
+        if match["quantity"] == "cmi":  # a file of several bands has the flags of each
+            values = _of_quality(file, values, path, f"DQF_{band}")
+        found.append(Found(band, values, is_brf, source))
     return found
 
 
@@ -178,12 +180,15 @@ def _of_one_time(array: xr.DataArray) -> xr.DataArray:
     return array.squeeze([dim for dim in array.dims[:-2] if array.sizes[dim] == 1])
 
 
-def _of_quality(file: xr.Dataset, values: np.ndarray, path: object) -> np.ndarray:
-    if "DQF" not in file.variables:
+def _of_quality(
+    file: xr.Dataset, values: np.ndarray, path: object, name: str = "DQF"
+) -> np.ndarray:
+    """Values without those that flags of a name, where a file has any, call none."""
+    if name not in file.variables:
         return values
-    quality = _plane(file, "DQF", path)
+    quality = _plane(file, name, path)
     if quality.shape != values.shape:
-        raise InputError(f"DQF in {path} has {quality.shape} pixels, its image {values.shape}.")
+        raise InputError(f"{name} in {path} has {quality.shape} pixels, its image {values.shape}.")
     return np.where(quality <= _LARGEST_QUALITY, values, np.nan)
 
 

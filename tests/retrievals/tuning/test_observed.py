@@ -98,6 +98,16 @@ def test_missing_values_are_missing_pixel_by_pixel(image, write):
     assert lost.sum() == 1 and lost[1, 1, 2]
 
 
+def test_flags_of_a_file_of_several_bands_are_each_bands_own(image, write):
+    """As of ABI's multi-band imagery: 1 is usable under conditions, 2 saturated."""
+    file = named(image, "CMI_C0{}")
+    quality = np.zeros(file["CMI_C01"].shape, np.int8)
+    quality[1, 2], quality[0, 0] = 2, 1
+    file["DQF_C01"] = (("lat", "lon"), quality)
+    lost = np.isnan(read_observed(write(file), image)["reflectance_factor"].values)
+    assert lost.sum() == 1 and lost[0, 1, 2]
+
+
 def test_the_nearest_pixel_is_taken_where_that_is_asked_for(image, write):
     moved = named(image)
     moved["latitude"] = moved["latitude"] + 0.01  # 1.1 km
