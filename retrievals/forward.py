@@ -154,7 +154,10 @@ def prepared(forward: ForwardModel, states: State) -> ForwardModel:
 
 @Kept
 def _largest_tau(forward: ForwardModel, states: State) -> Float[Array, " column"]:
-    """Optical depth of the thickest layer of each column at the extremes of x. [-]"""
+    """Optical depth of the thickest layer of each column at the extremes of x. [-]
+
+    Extremes at which it is no number are left out; where it is none at any, neither is this.
+    """
     num_columns = states.geometry.solar_zenith.shape[0]
     extremes = product(*(q.transform.extremes for q in forward.vector.quantities))
 
@@ -166,4 +169,5 @@ def _largest_tau(forward: ForwardModel, states: State) -> Float[Array, " column"
         everywhere = jnp.broadcast_to(x, (num_columns, x.size))
         return jax.vmap(of_one)(forward.state(everywhere, states).atmosphere)
 
-    return jnp.max(jax.lax.map(at, jnp.array(list(extremes))), axis=0)
+    # At infinite x a quantity may be none, of which the other extremes know nothing.
+    return jnp.nanmax(jax.lax.map(at, jnp.array(list(extremes))), axis=0)

@@ -18,6 +18,9 @@ LARGEST_FACTOR = 10.0
 HIGHEST = 20e3
 """No plume is higher above the ground. [m]"""
 
+THINNEST = 1.0
+"""No plume is made thinner: without any thickness its extinction would be infinite. [m]"""
+
 _REFERENCE_UM = 0.55
 
 
@@ -101,7 +104,8 @@ def _height(species: str, plume: Plume) -> Quantity:
 
 def _top(species: str, plume: Plume) -> Quantity:
     base, top = float(plume.base), float(plume.top)
-    limits = base, max(HIGHEST, 2 * top - base)
+    # At the lower limit, too, it is a plume: doublings are those that its extremes need.
+    limits = base + min(THINNEST, (top - base) / 2), max(HIGHEST, 2 * top - base)
     return Quantity(
         "top",
         "m",

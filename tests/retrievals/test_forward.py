@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import equinox as eqx
+import jax
 import numpy as np
 
 from abi_operator import reflectance_factor
@@ -14,6 +15,8 @@ from retrievals.images import forward_model
 from retrievals.kinds import BANDS
 from retrievals.observation import observe
 from retrievals.state_vector import StateVector
+from retrievals.transforms import Bounded
+from retrievals.tuning import plume_numbers
 
 ROUNDING = 1e-11
 
@@ -99,3 +102,21 @@ def test_a_column_that_is_no_number_asks_for_no_doublings(columns, forward):
     pressure[3] = np.nan
     holed = eqx.tree_at(lambda s: s.atmosphere.pressure, states, pressure)
     assert prepared(forward, holed).num_doublings == prepared(forward, states).num_doublings
+
+
+def test_an_extreme_without_a_number_leaves_a_clouds_doublings(columns, forward):
+    """A plume of no thickness has infinite extinction, and its clouds are as thick as ever."""
+    _, states, _ = columns
+    thick = jax.tree.map(lambda path: 40 * path, states.atmosphere.liquid)
+    cloudy = eqx.tree_at(lambda s: s.atmosphere.liquid, states, thick)
+    smoke = jax.tree.map(lambda leaf: leaf[0], states.atmosphere.plumes["smoke"])
+
+    def doublings(vector, states):
+        return prepared(replace(forward, vector=vector), states).num_doublings
+
+    strength, top = (plume_numbers([name], "smoke", smoke) for name in ("strength", "top"))
+    (edge,) = top.quantities
+    to_the_base = StateVector((replace(edge, transform=Bounded(float(smoke.base), 2e4)),))
+    many = doublings(strength, cloudy)
+    assert many > doublings(strength, states)
+    assert doublings(top, cloudy) == doublings(to_the_base, cloudy) == many

@@ -52,6 +52,16 @@ def test_what_cannot_be_fitted_is_refused(names, sentence):
         plume_numbers(names, "smoke", PLUME)
 
 
+@pytest.mark.parametrize("thickness", [1.5, 2000.0])
+def test_the_upper_edge_never_comes_down_to_the_base(thickness):
+    """At its lowest it has the same optical depth, in a layer that is thin."""
+    plume = smoke(0.8, base=1000.0, top=1000.0 + thickness, bands=("C01",))
+    transform = plume_numbers(["top"], "smoke", plume).quantities[0].transform
+    lowest = with_top(plume, transform.value(jnp.asarray(min(transform.extremes), float)))
+    assert 0 < float(lowest.top - lowest.base) <= 1
+    assert float(lowest.aod_550) == pytest.approx(0.8, rel=1e-3)
+
+
 def test_a_plume_on_the_ground_has_no_height_to_shift():
     with pytest.raises(ValueError, match="fit top"):
         plume_numbers(["height"], "smoke", smoke(0.8, base=0.0, top=2000.0))
