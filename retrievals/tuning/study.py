@@ -111,7 +111,9 @@ def tuned(
     Returns
     -------
     xarray.Dataset
-        As `compared` with the stage ``tuned`` as well, and what `product.fit_dataset` says of the
+        As `compared` with the stage ``tuned`` as well (in the plume what the fit predicts to be
+        observed, which is times the fitted gains where the calibration is unknown; outside the
+        scene as it is), and what `product.fit_dataset` says of the
         fit and of whether it explains the observation.
 
     Raises
@@ -136,12 +138,16 @@ def tuned(
     with jax.enable_x64(True):
         problem = _problem(image, vector, pixels, errors)
         found = fit(problem)
-        of_plume = found.normal.predicted
+        # As the residuals have it: what the gains explain is no bias any more.
+        of_plume = (1 + problem.gains(found.z)) * found.normal.predicted
         maps = _factor(image, bands).copy(deep=True)
         maps.values[:, pixels.y, pixels.x] = of_plume.T
         table = fit_dataset(problem, found, _first_state(pixels))
     stages = {"scene": _factor(image, bands), "tuned": maps}
     both = compare(stages, observed.sel(band=list(bands)), regions)
+    if errors.calibration:
+        for variable in (both["simulated"], both["difference"]):
+            variable.attrs["long_name"] += ", in the plume of stage tuned with the fitted gains"
     about = _about(name, bands) | {
         "fitted": " ".join(vector.names),
         "pixels_that_decide": where,

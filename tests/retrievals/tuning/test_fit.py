@@ -96,3 +96,7 @@ def test_an_unknown_gain_is_found(image, true_image, observe_as):
     assert np.abs((found["value"] - truth) / found["sigma"]).max() < 3
     assert found.attrs["misfit_found"] == 0
     assert list(found["element"].values[3:]) == ["gain_C01", "gain_C02", "gain_C03"]
+    # The table is of what the residuals are of: a bias that the gains explain is none.
+    one = found.sel(stage="tuned", region="plume")
+    assert (np.abs(one["bias"]) < 2e-3 * one["observed_mean"]).all()
+    assert "with the fitted gains" in found["simulated"].attrs["long_name"]
