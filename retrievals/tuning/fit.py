@@ -221,7 +221,9 @@ def _normal(problem: Problem, sigma: np.ndarray, z: np.ndarray) -> Normal:
     predicted, residual = np.empty_like(pixels.measured), np.empty_like(pixels.measured)
     for rows, states in pixels.blocks():
         value, jacobian = _image_of_block(problem, states, x)
-        counts, scale = pixels.counts[rows], sigma[rows]
+        counts = pixels.counts[rows]
+        # An error may be no number where nothing counts, and such a quotient would not be 0.
+        scale = np.where(counts, sigma[rows], 1)
         departure = np.where(counts, (1 + gains) * value - pixels.measured[rows], 0) / scale
         by_x = (1 + gains)[:, None] * jacobian * problem.sigma_prior
         by_gain = np.zeros((*value.shape, free.size))

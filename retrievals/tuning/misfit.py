@@ -6,7 +6,8 @@ averaging kernel) [1]_: over its degrees of freedom n it is :math:`1 \pm \sqrt{2
 without a mean in any band, :math:`0 \pm 1/\sqrt{n_b}`, and not alike in neighbouring pixels: with m
 pairs of neighbours in a row or column the mean product of their residuals is
 :math:`0 \pm 1/\sqrt{m}`. Each departure is told in standard deviations, and from `LARGEST` on the
-fit is a misfit: of twenty such numbers of noise alone one is as large in a thousand fits.
+fit is a misfit: of twenty such numbers of noise alone one is as large in a thousand fits. A model
+that is no number where something was observed explains nothing, and is a misfit as well.
 
 References
 ----------
@@ -31,7 +32,7 @@ class Tested(NamedTuple):
 
     @property
     def departure(self) -> float:
-        """In standard deviations; 0 of what cannot be said. [-]"""
+        """In standard deviations; 0 of what cannot be said, which `Misfit.reasons` looks at. [-]"""
         found = (self.value - self.expected) / self.scatter if self.scatter > 0 else 0.0
         return found if np.isfinite(found) else 0.0
 
@@ -60,6 +61,10 @@ class Misfit(NamedTuple):
     def reasons(self) -> list[str]:
         """What speaks against the model, in words; none if nothing does."""
         found = []
+        if not np.isfinite(self.chi_square.value):
+            lost = [band for band, test in self.by_band.items() if not np.isfinite(test.value)]
+            where = f", as residuals are none in {', '.join(lost)}" if lost else ""
+            found.append(f"reduced chi-square is no finite number{where}")
         if self.chi_square.departure > LARGEST:
             found.append(
                 f"reduced chi-square {self.chi_square.value:.4g} where noise has "
@@ -142,5 +147,6 @@ def _alike(field: np.ndarray, good: np.ndarray) -> Tested:
     pairs = int(across.sum() + along.sum())
     if pairs == 0:
         return Tested(0.0, 0.0, 0.0)
-    products = np.sum(field[:, 1:] * field[:, :-1]) + np.sum(field[1:] * field[:-1])
+    with np.errstate(invalid="ignore"):  # of infinite residuals, of which chi-square tells
+        products = np.sum(field[:, 1:] * field[:, :-1]) + np.sum(field[1:] * field[:-1])
     return Tested(float(products) / pairs, 0.0, float(1 / np.sqrt(pairs)))

@@ -112,7 +112,7 @@ def _caveats(found: xr.Dataset) -> list[str]:
         lines.append(f"a second minimum: {about['second_minimum']} (4 would be two sigma)")
     if about["at_limit"] != "none":
         lines.append(f"at a limit of what it may be: {about['at_limit'].replace(' ', ', ')}")
-    if about["misfit_found"]:
+    if about["misfit_found"] and np.isfinite(about["chi_square"]):
         lines.append(
             "were the misfit noise, errors would be "
             f"{max(1.0, float(about['chi_square'])) ** 0.5:.2g} times as large"

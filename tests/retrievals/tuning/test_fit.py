@@ -1,5 +1,7 @@
 """A plume's numbers come back from its own image, and another world is told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -100,3 +102,17 @@ def test_an_unknown_gain_is_found(image, true_image, observe_as):
     one = found.sel(stage="tuned", region="plume")
     assert (np.abs(one["bias"]) < 2e-3 * one["observed_mean"]).all()
     assert "with the fitted gains" in found["simulated"].attrs["long_name"]
+
+
+def test_an_error_that_is_no_number_where_nothing_counts_is_none_of_the_others(problem):
+    """As of a pixel that cannot be predicted, in which nothing was observed."""
+    measured = problem.pixels.measured.copy()
+    measured[2] = np.nan
+    holed = problem._replace(pixels=replace(problem.pixels, measured=measured))
+    sigma = problem.error_of(problem.pixels.measured)
+    expected = _normal(holed, sigma, np.zeros(3))
+    sigma[2] = np.nan
+    found = _normal(holed, sigma, np.zeros(3))
+    for ours, theirs in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert (found.residual[2] == 0).all()

@@ -54,3 +54,16 @@ def test_what_does_not_count_does_not():
 def test_less_noise_than_is_assumed_is_said():
     found = misfit(0.5 * noise(5), COUNTS, BANDS, 0.0)
     assert not found.found and "closer than noise allows" in found.sentence
+
+
+def test_what_is_no_number_is_a_misfit():
+    """In one pixel or all of them: a model that gives none has not explained what was observed."""
+    found = misfit(np.full((1, 3, 3), np.nan), np.ones((1, 3, 3), bool), ("C01",), 0.0)
+    assert found.found and "no finite number, as residuals are none in C01" in found.sentence
+    for lost in (np.nan, np.inf):
+        fields = noise(6)
+        fields[1, 2, 3] = lost
+        found = misfit(fields, COUNTS, BANDS, 3.0)
+        assert len(found.reasons) == 1 and found.reasons[0].endswith("residuals are none in C02")
+    unknown = misfit(noise(6), COUNTS, BANDS, np.nan)  # as of a covariance that is none
+    assert unknown.reasons == ["reduced chi-square is no finite number"]
