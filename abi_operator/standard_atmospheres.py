@@ -81,16 +81,7 @@ def standard_atmosphere(
     """
     if name not in _PROFILES:
         raise ValueError(f"no standard atmosphere {name!r}; choose from {list(_PROFILES)}.")
-    levels = 1e3 * np.array(_HEIGHT) if height is None else np.asarray(height, np.float64)
-    if levels.ndim != 1 or levels.size < 2 or np.any(np.diff(levels) >= 0):
-        raise ValueError(f"height must fall from level to level, top first; got {height}.")
-    if levels[0] > 1e3 * _HEIGHT[0] or levels[-1] < 1e3 * _HEIGHT[-1]:
-        raise ValueError(f"height must lie in 0-120000 m; got {levels[-1]} to {levels[0]}.")
-    if levels[0] - levels[-1] <= _HEIGHT[0]:
-        raise ValueError(
-            f"height is in m; the levels reach over {levels[0] - levels[-1]:g} m, as those of "
-            "heights in km do."
-        )
+    levels = 1e3 * np.array(_HEIGHT) if height is None else _checked_levels(height)
     profile = _PROFILES[name]
     above = np.interp(-levels, -1e3 * np.array(_HEIGHT), np.arange(len(_HEIGHT)))
     pressure = 100 * np.exp(_interpolate(np.log(profile.pressure), above))
@@ -117,6 +108,20 @@ def standard_atmosphere(
         ),
         hydrometeors=dict(hydrometeors or {}),
     )
+
+
+def _checked_levels(height: ArrayLike) -> np.ndarray:
+    levels = np.asarray(height, np.float64)
+    if levels.ndim != 1 or levels.size < 2 or np.any(np.diff(levels) >= 0):
+        raise ValueError(f"height must fall from level to level, top first; got {height}.")
+    if levels[0] > 1e3 * _HEIGHT[0] or levels[-1] < 1e3 * _HEIGHT[-1]:
+        raise ValueError(f"height must lie in 0-120000 m; got {levels[-1]} to {levels[0]}.")
+    if levels[0] - levels[-1] <= _HEIGHT[0]:
+        raise ValueError(
+            f"height is in m; the levels reach over {levels[0] - levels[-1]:g} m, as those of "
+            "heights in km do."
+        )
+    return levels
 
 
 def _interpolate(values: np.ndarray, above: np.ndarray) -> np.ndarray:

@@ -142,6 +142,15 @@ def test_a_grid_on_a_map_has_coordinates_of_it(tmp_path, results):
         assert set(plain["brf"].coords) == {"time", "band", "latitude", "longitude", "x", "y"}
 
 
+def test_a_history_goes_on(tmp_path, results):
+    path, told = tmp_path / "result.nc", {"history": "as it was"}
+    with ResultWriter(path, times=TIMES, shape=SHAPE, attributes=told) as writer:
+        write_all(writer, results)
+    with netCDF4.Dataset(path) as file:
+        own, before = file.history.splitlines()
+    assert "written by abi_operator" in own and before == "as it was"
+
+
 def test_the_history_tells_the_command(tmp_path, results):
     words = "abi-operator simulate 'a file' --out folder"
     with ResultWriter(tmp_path / "a.nc", times=TIMES, shape=SHAPE, command=words) as writer:
