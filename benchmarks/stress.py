@@ -7,8 +7,9 @@ Columns are those of `stress_columns`, checks those of `stress_checks`. Streams 
 of the columns, 16 in 4.5 %, 32 in 0.45 %, 64 in 0.05 %; layers up to 1, 4, 16, 64 and 200. Each
 batch is a file of the folder, made from its name alone: a run that was stopped goes on with what
 is missing, and the bytes are the same. The folder has one in it for each state of the code that
-figures hang on (`stress_code`). Every core has a process of its own. The worst columns are solved
-with 40 digits (`stress_truth`), and judged by them.
+figures hang on (`stress_code`). Every core has a process of its own. What fails is
+asked once more (`stress_again`); the worst columns are solved with 40 digits (`stress_truth`), and
+judged by them.
 
 `--columns 1000000` is the long run; how long it would take is printed, but for compiling, which is
 done once. Exits with 1 where a check failed, a worst column is wrong, or a number out of range
@@ -26,11 +27,16 @@ from pathlib import Path
 import jax
 import numpy as np
 import stress_truth
-from stress_checks import AGREE, CHECKS, FLOOR, LIMITS, Judged, both, refused, scale_of, value
+from stress_again import (
+    without_albedos_of_the_equations,
+    without_the_equations_own,
+    without_the_quotients_own,
+    without_what_is_conserved,
+)
+from stress_checks import CHECKS, Judged, refused
 from stress_code import state_of_code
 from stress_columns import GROUPS, SEED, columns_of
-from stress_directions import along, moved
-from stress_report import PRECISIONS, SIGNS, by_check, by_stratum, described, failed, worst
+from stress_report import PRECISIONS, by_check, by_stratum, described, failed, worst
 
 from abi_operator import use_compilation_cache
 from abi_operator.machine.speed import usable_cores
@@ -41,7 +47,6 @@ PORTION = 40
 # Most by which a column may err against 40 digits.
 RIGHT = {"float64": 1e-6, "float32": 2e-2}
 KNOWN = 0.9  # share of them that must have such a truth
-LONGER_STEP = 1e-3  # than that of `stress_checks`, whose quotients lose digits under deep layers
 FIELDS = [("stratum", "i2"), ("value", "f8"), ("beyond", "?"), *((name, "f8") for name in CHECKS)]
 
 
@@ -120,77 +125,6 @@ def read(folder, columns, precision, groups):
             found[-1][1][:, 2] = np.arange(rows.size)
     rows, where = zip(*found, strict=True)
     return np.concatenate(rows), np.concatenate(where)
-
-
-def without_the_equations_own(rows, where, precision):
-    """Take back wrong signs that 40 digits have as much; streams may agree by chance."""
-    wrong = failed(rows, SIGNS[0], precision) | failed(rows, SIGNS[1], precision)
-    taken = 0
-    for i in np.flatnonzero(wrong):
-        group = GROUPS[where[i, 0]]
-        if group[0] <= 8 and not group[3]:
-            batch = columns_of(group, where[i, 1], precision)
-            own = stress_truth.falls(batch.columns, where[i, 2], group[0])
-            size = max(abs(rows["value"][i]), FLOOR)
-            for name in SIGNS:
-                limit = LIMITS[name][PRECISIONS.index(precision)]
-                if limit < rows[name][i] <= limit + (1 + AGREE) * own / size:
-                    rows[name][i], taken = np.nan, taken + 1
-    print(f"Signs that the equations have by themselves, by 40 digits: {taken}\n")
-
-
-def without_what_is_conserved(rows, where, precision):
-    """Leave columns that absorb nothing, and fail "absorption", to "energy", which asks the very
-    same number of them."""
-    taken = 0
-    for i in np.flatnonzero(failed(rows, "absorption", precision)):
-        number, index, row = where[i]
-        columns = columns_of(GROUPS[number], index, precision).columns
-        absorbed = columns["tau"][row] * (1 - columns["ssa"][row])
-        if not absorbed.any() and columns["albedo"][row] == 1:
-            rows["absorption"][i], taken = np.nan, taken + 1
-    print(f"Columns that absorb nothing, judged by energy alone: {taken}\n")
-
-
-def without_the_quotients_own(rows, where, precision):
-    """Compare slopes that fail over a longer step as well: what rounding leaves of a quotient is
-    the less, the longer its step. Of single precision no quotient is formed."""
-    for name in ("slope", "partial"):
-        again = np.flatnonzero(failed(rows, name, precision))
-        for i in again:
-            number, index, row = where[i]
-            found = over_a_longer_step(GROUPS[number], index, row, precision)[name]
-            rows[name][i] = min(rows[name][i], found)
-        print(f"Slopes compared over a longer step as well ({name}): {again.size}", end="")
-        print(f", then off by {rows[name][again].max():.1e} at most\n" if again.size else "\n")
-
-
-def over_a_longer_step(group, index, row, precision):
-    """The checks "slope" and "partial" of one column of a batch."""
-    batch, streams = columns_of(group, index, precision), group[0]
-    asked = Judged(batch.columns, batch.further, streams, [streams, index])
-    columns, directions, one = (
-        {name: x[row : row + 1] for name, x in given.items()}
-        for given in (batch.columns, asked.directions, asked.one)
-    )
-
-    def at(way, steps):
-        return value(moved(columns, way, steps * LONGER_STEP), num_streams=streams)
-
-    (_, light), slopes = both(columns, streams)
-    light = np.asarray(light, np.float64)
-    floor = asked.floor[row]
-    quotients = {
-        "slope": (directions, at(directions, 1) - at(directions, -1)),
-        "partial": (one, 4 * at(one, 1) - at(one, 2) - 3 * light),
-    }
-    found = {}
-    for name, (way, difference) in quotients.items():
-        slope, sizes = along(slopes, way)
-        apart = abs(difference / (2 * LONGER_STEP) - slope)
-        of = np.maximum(sizes, floor) if name == "slope" else scale_of(sizes, light, floor)
-        found[name] = float((apart / of)[0])
-    return found
 
 
 def judged(task):
@@ -275,6 +209,7 @@ def main():
     rows, where = read(folder, options.columns, options.precision, groups)
     without_the_equations_own(rows, where, options.precision)
     without_what_is_conserved(rows, where, options.precision)
+    without_albedos_of_the_equations(rows, where, options.precision)
     without_the_quotients_own(rows, where, options.precision)
     by_stratum(rows, options.precision)
     by_check(rows, where, options.precision)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from forty_digits import forty_digit_radiance  # noqa: E402
+from forty_digits import forty_digit_albedo, forty_digit_radiance  # noqa: E402
 
 FLOOR = 1e-3
 
@@ -50,3 +50,15 @@ def falls(columns, row, num_streams):
     """
     black, own, white = (truth(columns, row, num_streams, a) for a in (0.0, None, 1.0))
     return max(-black, black - own, own - white, 0.0)
+
+
+def outside(columns, row, num_streams):
+    """How far the equations themselves have a plane albedo below 0 or above 1, where few streams
+    cut off phase functions. 0 where they do not, or 40 digits cannot be had."""
+    lit = ("tau", "ssa", "moments", "albedo", "mu0")
+    own = {name: np.asarray(columns[name][row], np.float64) for name in lit}
+    try:
+        share = forty_digit_albedo(**own, num_streams=num_streams)
+    except ArithmeticError:
+        return 0.0
+    return max(-share, share - 1, 0.0)

@@ -265,6 +265,32 @@ def forty_digit_radiance(
         ctx.prec = before
 
 
+def forty_digit_albedo(tau, ssa, moments, albedo, mu0, num_streams):
+    """Plane albedo of one column, from the mean over azimuth at the nodes alone. [-]
+
+    Arguments as of `forty_digit_radiance`.
+    """
+    before, ctx.prec = ctx.prec, BITS
+    try:
+        pairs, sun = leaning(num_streams // 2), arb(float(mu0))
+        cosines, weights = (
+            [*own, last] for own, last in zip(zip(*pairs, strict=True), (sun, arb(1)), strict=True)
+        )
+        directions = _Directions(cosines, weights, len(pairs))
+        scaled = _scaled(
+            (tau, ssa, moments), [1 / sun] * len(tau), np.zeros(len(tau) + 1), num_streams, True
+        )
+        layers = [layer for layer, *_ in scaled]
+        reflection, _ = _mode(layers, albedo, None, 0, directions, False)
+        up = [w * x * reflection[i, len(pairs)] for i, (x, w) in enumerate(pairs)]
+        found = sum(up, arb(0)) / sun
+        if not float(found.rad()) <= RADIUS * abs(float(found)):
+            raise ArithmeticError(f"the result is only known as {found}.")
+        return float(found)
+    finally:
+        ctx.prec = before
+
+
 def forty_digit_brf(*column, on_double_gauss=False):
     """Bidirectional reflectance factor; arguments as `cdisort.cdisort_brf`, and whose nodes."""
     how = {"solar_irradiance": 1.0, "on_double_gauss": on_double_gauss}

@@ -47,8 +47,10 @@ OF_NO_MODES = 0.1
 """Share of the budget below which all modes but the mean are expected to stay."""
 DECAY = 0.3
 """Ratio of neighbouring modes' sizes, to see a small one by chance for what it is: its neighbour
-counts, times this, as well as itself, and where phase functions have peaks the one beside that,
-times its square (`plan.Plan`)."""
+counts, times this, as well as itself, and where phase functions have peaks all that are up to
+`LOOKED_BACK` before it, times this as often (`plan.Plan`)."""
+LOOKED_BACK = 3
+"""Modes before one of columns with peaks, by which it is seen whether it may be the last."""
 FORWARD, BACKWARD = 0.75, 0.05
 """Share of what scatters, times its last moment, from which phase functions have a peak of which
 modes are small by chance: forwards, over the number of streams (delta-M leaves 1 of an endlessly

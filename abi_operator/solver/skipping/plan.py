@@ -65,7 +65,7 @@ class Plan(eqx.Module):
         Of the light beside the modes', and the relative error of it that may be made; None where
         all modes are solved.
     peaked
-        1 for columns of which two modes in a row may be small by chance, else 0: their phase
+        1 for columns of which three modes in a row may be small by chance, else 0: their phase
         functions have forward peaks that delta-M leaves a part of, whose modes hardly decay. 2 for
         those with backward peaks, of which any number of modes may: they are all solved. None where
         all modes of all columns are solved.
@@ -150,10 +150,13 @@ def planned(
     warm
         What is known of columns that emit.
     """
-    given, groups = layers, None
+    given, groups, peaked = layers, None, _peaked(layers)
+    # Few moments of such a phase function are as much below 0 as above: light scattered once, of
+    # the whole function, says nothing of the rest.
+    least = jnp.where(peaked > 1, known.dark, known.least)
     if layers.tau.shape[0] > 1:
         secant = 0.5 * (layers.sun_secants[0] + jnp.max(view_secants, axis=0))
-        allowed = budget.OF_MERGING * error_budget * known.least
+        allowed = budget.OF_MERGING * error_budget * least
         # Of reflectances that are large by 1 / (mu0 + mu), where sun and view graze, as a loss is.
         grazing = 1 / layers.sun_secants[0] + 1 / jnp.max(view_secants, axis=0)
         allowed = allowed * jnp.minimum(grazing, 1)
@@ -171,7 +174,7 @@ def planned(
     share = budget.OF_DOUBLINGS if warm is None else budget.OF_DOUBLINGS_WARM
     error, single = share * error_budget, budget.rounds(error_budget)
     doublings = layer_doublings(layers.tau, secants, num_streams, most, error, single)
-    return Plan(layers, doublings, given, groups, known, error_budget, _peaked(given))
+    return Plan(layers, doublings, given, groups, known, error_budget, peaked)
 
 
 def _peaked(layers: LayersOfModes) -> Float[Array, "*batch"]:
@@ -259,8 +262,8 @@ def over_modes(
         carry, found = jax.lax.scan(lambda c, mode: body(c, mode, 1.0)[:2], carry, rest)
         return carry, found
     tau = plan.layers.tau[0]
-    latest, earlier = budget.DECAY, budget.DECAY**2
-    before = (jnp.full_like(tau, jnp.inf),) * 2
+    latest, *earlier = (budget.DECAY**i for i in range(1, budget.LOOKED_BACK + 1))
+    before = (jnp.full_like(tau, jnp.inf),) * budget.LOOKED_BACK
     beyond, peaked = plan.beyond_the_mean(), plan.peaked
     assert peaked is not None
     counts = jnp.where(beyond | (start == 0), jnp.ones_like(tau), 0)
@@ -276,13 +279,10 @@ def over_modes(
         rows = jax.tree.map(
             lambda x, new: jax.lax.dynamic_update_index_in_dim(x, new, m, 0), rows, row
         )
-        wanting = (
-            (share > 1)
-            | (latest * before[0] > 1)
-            | ((peaked > 0) & (earlier * before[1] > 1))
-            | (peaked > 1)
-        )
-        before = share, before[0]
+        wanting = (share > 1) | (latest * before[0] > 1) | (peaked > 1)
+        for decayed, past in zip(earlier, before[1:], strict=True):
+            wanting = wanting | ((peaked > 0) & (decayed * past > 1))
+        before = share, *before[:-1]
         return m + 1, carry, rows, before, jnp.where(wanting & beyond, counts, 0)
 
     rows = jax.tree.map(jnp.zeros_like, rows)
