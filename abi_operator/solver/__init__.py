@@ -27,5 +27,7 @@ from .phase_table import mix_phase_functions as mix_phase_functions
 from .phase_table import moments_of_table as moments_of_table
 from .phase_table import normalise_table as normalise_table
 from .settings import Settings as Settings
+from .surroundings import Surroundings as Surroundings
+from .surroundings import surroundings as surroundings
 from .toa_brf import toa_brf as toa_brf
 from .toa_radiance import toa_radiance as toa_radiance

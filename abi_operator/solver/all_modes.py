@@ -17,6 +17,7 @@ from .gradient.mode_sum import Given, ModeSum, mode_sum
 from .gradient.modes import How
 from .lit import seen_from_the_view, weights_of_modes
 from .method.adding import emitting_ground
+from .method.around import Above
 from .method.azimuth import Directions, legendre_tables, weighted_moments
 from .method.bordered import Bordered
 from .method.delta_m import ScaledLayers
@@ -47,7 +48,26 @@ class Sunlit(NamedTuple):
 def twice_reflected(given: tuple[Sunlit, Given], options: Options) -> Float[Array, "view *batch"]:
     """Twice the sum over all modes of what is given, with what only that needs."""
     (layers, directions, albedo, azimuth), known = given
-    mean, others = grounds_of(albedo, directions, options)
+    grounds = grounds_of(albedo, directions, options)
+    return _twice_reflected(layers, directions, grounds, azimuth, known, options)
+
+
+def twice_reflected_between(
+    layers: ScaledLayers,
+    directions: Directions,
+    below: Bordered,
+    above: Above,
+    azimuth: Float[Array, "view *batch"],
+    known: Given,
+    options: Options,
+) -> Float[Array, "view *batch"]:
+    """The same of layers between others, which are given in all modes (`method.around`)."""
+    grounds = jax.tree.map(lambda x: x[0], below), jax.tree.map(lambda x: x[1:], below)
+    return _twice_reflected(layers, directions, grounds, azimuth, known, options, above)
+
+
+def _twice_reflected(layers, directions, grounds, azimuth, known, options, above=None):
+    mean, others = grounds
     even, odd = weighted_moments(layers)
     sun_secants, cosines = directions.sun_secants, directions.cosines
     inputs = ModeSum(
@@ -57,6 +77,7 @@ def twice_reflected(given: tuple[Sunlit, Given], options: Options) -> Float[Arra
         ground=mean,
         grounds=others,
         weights=weights_of_modes(options.num_modes, azimuth),
+        above=above,
     )
     return mode_sum(inputs, known, _how(options))
 

@@ -20,6 +20,7 @@ from .method.surface import AnySurface, Lambertian
 class Column(NamedTuple):
     """Arguments of `toa_brf` and `toa_radiance` by name, None where not given.
 
+    `around` is what `surroundings` keeps of other layers above and below.
     Outside, batch axes lead and broadcast; `OWN_AXES` tells the axes that belong to one column.
     """
 
@@ -36,6 +37,7 @@ class Column(NamedTuple):
     surface_emission: jax.Array | None = None
     isotropic_top: jax.Array | None = None
     solar_irradiance: jax.Array | None = None
+    around: jax.Array | None = None
 
 
 OWN_AXES = {
@@ -47,6 +49,7 @@ OWN_AXES = {
     "phase_function": ("layer", "view"),
     "secant": ("layer",),
     "planck_levels": ("level",),
+    "around": ("number",),
 }
 """Axes of one column's arguments; those not named here are one number."""
 

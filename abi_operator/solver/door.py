@@ -57,13 +57,14 @@ def solve(
     faint
         Maps such columns to what `tile` gives of those that need no solution; see `glimpse`.
     by_view
-        Which results of `tile` have an axis of views: a pytree of bools of the same structure.
+        Which results of `tile` have an axis of views: a pytree of bools of the same structure. One
+        of the results may be so many numbers a column, which is said in place of False.
     given
         What the caller gave, where that is not the column to solve: its values are checked.
     """
     options = _options(column, settings)
     if settings.check_values:
-        arguments = {k: x for k, x in (given or column)._asdict().items() if x is not None}
+        arguments = _values(given or column)
         check_arguments(arguments, series_summed=options.tms and "phase_function" not in arguments)
     leaves, structure = jax.tree.flatten(column)
     # Those of None are checked by the program, which knows what can be read under derivatives too.
@@ -72,6 +73,12 @@ def solve(
     how = options, several, structure, by_view, checked, column.tau.dtype
     program = _Program(tile, gradient, faint, *how)
     return enter(program, leaves)
+
+
+def _values(column: Column) -> dict[str, Any]:
+    """Arguments whose values have a range."""
+    arguments = column._replace(around=None)._asdict()
+    return {name: x for name, x in arguments.items() if x is not None}
 
 
 def _options(column: Column, settings: Settings) -> Options:
@@ -110,7 +117,7 @@ class _Program(NamedTuple):
     def known(self, leaves: Leaves, what: Any) -> "_Program":
         column = jax.tree.unflatten(self.structure, leaves)
         if not self.checked:
-            check_in_memory(column._asdict())
+            check_in_memory(_values(column))
         program = self._of(what)
         if what == "value" or self.options.num_doublings is not None:
             return program
@@ -131,9 +138,12 @@ class _Program(NamedTuple):
         column = jax.tree.unflatten(self.structure, leaves)
         views = (longest(column, True)["view"],) if self.multiple_views else ()
         dtype = jnp.result_type(*leaves)
-        return jax.tree.map(
-            lambda has: jax.ShapeDtypeStruct(views if has else (), dtype), self.by_view
-        )
+
+        def own(has: bool | int) -> Any:
+            axes = (views if has else ()) if isinstance(has, bool) else (has,)
+            return jax.ShapeDtypeStruct(axes, dtype)
+
+        return jax.tree.map(own, self.by_view)
 
     def widths(self, leaves: Leaves, what: Any) -> tuple[int, ...]:
         streams, dtype = self.options.num_streams, leaves[0].dtype
@@ -189,7 +199,11 @@ class _Program(NamedTuple):
         """Results of a tile, without the axis of the one view where there are not several."""
         if self.multiple_views:
             return result
-        return jax.tree.map(lambda x: x.reshape(x.shape[-1:]), result)
+
+        def outward(has: bool | int, x: Array) -> Array:
+            return x.reshape(x.shape[-1:]) if isinstance(has, bool) else x
+
+        return jax.tree.map(outward, self.by_view, result)
 
 
 @cache

@@ -49,7 +49,7 @@ def need(column: Column, options: Options, slopes: bool) -> Float[Array, "*batch
     return company.need(alike, known, column.mu0, mu, options.error_budget, slopes)
 
 
-def _depths_of(layers: ScaledLayers, directions: Directions) -> Depths:
+def depths_of(layers: ScaledLayers, directions: Directions) -> Depths:
     """What the layers add up to."""
     backward = layers.ssa * (1 - layers.moments[:, 1])
     return depths(layers.tau, layers.coalbedo, backward, directions.sun_secants)
@@ -65,7 +65,21 @@ def expected_of(
 
     A ground that is not Lambertian has sent its light to `rest` and to the modes.
     """
-    return _expected_of(column, _depths_of(layers, directions), directions, rest)
+    return _expected_of(column, depths_of(layers, directions), directions, rest)
+
+
+def expected_between(
+    column: Column,
+    layers: ScaledLayers,
+    directions: Directions,
+    rest: Float[Array, "view *batch"],
+    around: Depths,
+    peaked: Float[Array, "*batch"],
+) -> Expected:
+    """The same of layers between others that add up to `around`, with the peaks of those."""
+    own = depths_of(layers, directions)
+    whole = Depths(*(x + y for x, y in zip(own, around, strict=True)))
+    return _expected_of(column, whole, directions, rest)._replace(peaked=peaked)
 
 
 def _expected_of(
@@ -85,7 +99,7 @@ def warm_of(
 ) -> Warm:
     """Of the radiance of columns that emit, over Lambertian ground."""
     assert not isinstance(column.albedo, AnySurface)
-    sums = _depths_of(layers, directions)
+    sums = depths_of(layers, directions)
     known = _expected_of(column, sums, directions, rest)
     seen = jnp.exp(-sums.tau / column.mu[0])
     up = _air(column, layers.tau, layers.coalbedo, _FEW_STREAMS).up

@@ -38,6 +38,7 @@ from jaxtyping import Array, Float
 from ...machine.algebra import fenced, matmul, total
 from ...machine.kernels import one_kernel
 from ..method.adding import top
+from ..method.around import Above
 from ..method.bordered import Bordered
 from ..method.doublings import Doublings
 from ..method.layer import ModeKernels
@@ -112,8 +113,11 @@ def mode_slopes(
     weight: Float[Array, "*batch"],
     slopes: Shared,
     room: Room,
+    above: Above | None = None,
 ) -> tuple[Float[Array, "*batch"], Room, Slopes]:
     """Reflection of a mode, and the slopes of `weight` times it, added to those of other modes.
+
+    There are none in what lies `above` the layers.
 
     The room (`room.Keeper.empty`) is given back filled. Layers are read and written inside the
     kernels: as inputs and outputs of a scan every array would be one more kernel a layer.
@@ -124,7 +128,8 @@ def mode_slopes(
     keeper = Keeper(layers.tau, layers.moments.shape[1], most, faces is not None)
     given = _Given(layers, plan, order, kernels, view_secant)
     stack, room = _up(ground, room, given, keeper, single_scattering)
-    reflection, fields = given.compiled(_fields_at_the_top, in_parts=True)(stack, weight)
+    closed = stack, weight, *(() if above is None else (above,))
+    reflection, fields = given.compiled(_fields_at_the_top, in_parts=True)(*closed)
     beams = (jnp.zeros_like(x.beams) for x in kernels)
     start = *beams, slopes.view_secant, jnp.zeros_like(view_secant)
     carry = fields, start, slopes.layers, faces
@@ -195,11 +200,14 @@ def _down(carry: Any, room: Room, given: _Given, keeper: Keeper, single_scatteri
     return given.compiled(all_layers)(carry, room, given)
 
 
-def _fields_at_the_top(stack: Bordered, weight):
+def _fields_at_the_top(stack: Bordered, weight, above: Above | None = None):
     """Reflection, and fields whose pair is the cotangent of `weight` times it."""
+    scale = jnp.stack([jnp.ones_like(weight), -0.5 * weight])
+    if above is not None:
+        seen, nodes = above.over(stack)
+        return seen[0], Fields(scale * nodes, scale * above.own, jnp.zeros_like(scale))
     solved = matmul(top(stack).inverse, stack.border)
     reflection = 0.5 * (jnp.sum(stack.border[:, 1] * solved[:, 0], axis=0) - stack.corner[0])
-    scale = jnp.stack([jnp.ones_like(weight), -0.5 * weight])
     return reflection, Fields(-scale * solved, scale, jnp.zeros_like(scale))
 
 

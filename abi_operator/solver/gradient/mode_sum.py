@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
 from ..method.adding import add_layer, top
+from ..method.around import Above
 from ..method.bordered import Bordered
 from ..method.doublings import Doublings
 from ..method.layer import half_layer
@@ -44,6 +45,9 @@ class ModeSum(NamedTuple):
         None is black.
     weights
         Of each mode's reflection towards each view in its sum.
+    above
+        What lies above the layers, modes on the first axis of every leaf; None is free space. It is
+        no variable: nobody takes slopes in it (`surroundings`).
     """
 
     layers: LayersOfModes
@@ -52,6 +56,7 @@ class ModeSum(NamedTuple):
     ground: Bordered
     grounds: Bordered | None
     weights: Float[Array, "mode view *batch"]
+    above: Above | None = None
 
     @property
     def num_nodes(self) -> int:
@@ -60,7 +65,8 @@ class ModeSum(NamedTuple):
 
     def every_mode(self) -> Mode:
         """What differs from mode to mode, on the first axis."""
-        return every_mode(self.ground, self.grounds, self.weights, self.beams, self.num_nodes)
+        modes = self.ground, self.grounds, self.weights, self.beams
+        return every_mode(*modes, self.num_nodes, self.above)
 
     def seen_from(self, view: Any) -> "ModeSum":
         """The same with one view."""
@@ -77,6 +83,10 @@ class ModeSum(NamedTuple):
             return Bordered(y.core, border, diagonal, one(y.corner, axis))
 
         grounds = None if self.grounds is None else ground(self.grounds, 1)
+        above = self.above
+        if above is not None:
+            lit = beams(above.nodes, 2), beams(above.own, 1), one(above.reflected, 1)
+            above = Above(above.core, *lit)
         even, odd = (beams(x, 1) for x in self.beams)
         return ModeSum(
             self.layers,
@@ -85,6 +95,7 @@ class ModeSum(NamedTuple):
             ground(self.ground, 0),
             grounds,
             one(self.weights, 1),
+            above,
         )
 
 
@@ -135,13 +146,14 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
 
         put_on = one_kernel(put_on, num_nodes, in_parts=True, num_beams=num_beams)
 
-        def of_all(ground, layers, plan, odd, kernels, view_secants):
+        def of_all(ground, layers, plan, odd, kernels, view_secants, *above):
             shared = layers, plan.doublings, odd, kernels, view_secants
 
             def add(stack, number):
                 return put_on(stack, *shared, *([] if number is None else [number]))
 
-            return top(over_layers(add, ground, plan, upwards=True)).reflection()
+            stack = over_layers(add, ground, plan, upwards=True)
+            return above[0].over(stack)[0] if above else top(stack).reflection()
 
         # Of one layer that is the only one XLA would find no use for what tells layers apart, and
         # what leaves towards several views is a sum that it would share among threads.
@@ -149,7 +161,8 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
             of_all = one_kernel(of_all, num_nodes, in_parts=True)
         layers = plan.layers.as_layers()
         shared = layers, plan, mode.order.odd, mode.kernels(), inputs.view_secants
-        return of_all(mode.below(inputs.ground, mean), *shared)
+        above = () if mode.above is None else (mode.above,)
+        return of_all(mode.below(inputs.ground, mean), *shared, *above)
 
     def another(total, mode, counts):
         found = reflection(False, lowered(mode), later, plan_of_later).astype(total.dtype)
@@ -214,9 +227,8 @@ def _reflectance_and_gradient(inputs, plan, how):
         value, slopes, of_mean, room = carry
         kernels, ground = mode.kernels(), mode.below(inputs.ground)
         weight = counts * mode.weight[0]
-        reflection, room, found = mode_slopes(
-            shared, plan, how.single_scattering, mode.order, kernels, ground, weight, slopes, room
-        )
+        given = shared, plan, how.single_scattering, mode.order, kernels, ground, weight
+        reflection, room, found = mode_slopes(*given, slopes, room, mode.above)
         if inputs.grounds is None:
             mean = mode.order.mean
             of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, found.ground)
@@ -251,6 +263,7 @@ def _reflectance_and_gradient(inputs, plan, how):
         ground=of_mean,
         grounds=of_grounds,
         weights=reflections,
+        above=jax.tree.map(jnp.zeros_like, inputs.above),
     )
     return value, gradient
 

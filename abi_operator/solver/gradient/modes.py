@@ -8,6 +8,7 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
+from ..method.around import Above
 from ..method.azimuth import mode_kernels
 from ..method.bordered import Bordered
 from ..method.ground import black
@@ -50,13 +51,15 @@ class How(NamedTuple):
 
 
 class Mode(NamedTuple):
-    """Of one mode; its ground is None where modes but the first see a black one."""
+    """Of one mode; its ground is None where modes but the first see a black one, and what lies
+    above its layers where that is free space."""
 
     order: Order
     weight: Float[Array, "*own_and_batch"]
     ground: Bordered | None
     nodes: tuple[Array, Array]
     beams: tuple[Array, Array]
+    above: Above | None = None
 
     def kernels(self) -> Kernels:
         """Those from which A and B are built."""
@@ -80,6 +83,7 @@ def every_mode(
     weights: Float[Array, "mode *own_and_batch"],
     beams: tuple[Array, Array],
     num_nodes: int,
+    above: Above | None = None,
 ) -> Mode:
     """What differs from mode to mode, on the first axis.
 
@@ -93,6 +97,8 @@ def every_mode(
         Legendre functions at the beams, even and odd l + m.
     num_nodes
         Half of the streams.
+    above
+        Layers above those that are solved, in all modes; None of free space.
     """
     dtype, num_modes = weights.dtype, weights.shape[0]
     functions = node_functions(2 * num_nodes, num_modes)
@@ -106,7 +112,7 @@ def every_mode(
     order = Order(number % 2, (number == 0).astype(dtype))
     if grounds is not None:
         grounds = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), ground, grounds)
-    return Mode(order, weights, grounds, (nodes(0), nodes(1)), beams)
+    return Mode(order, weights, grounds, (nodes(0), nodes(1)), beams, above)
 
 
 def along(slopes: Any, tangents: Any, value: Float[Array, "*batch"]) -> Float[Array, "*batch"]:

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 from ...machine.algebra import matmul, total
 from ...machine.elimination import inverse, solve
 from .bordered import Bordered, Vector, combined
-from .quotient import minus_and_quotient, minus_quotient
+from .quotient import Quotient, minus_and_quotient, minus_quotient
 
 
 class Emission(eqx.Module):
@@ -67,6 +67,16 @@ def add_layer(
     h, both, middle = _sums(stack, admittance, impedance, tau)
     base = [(1.0, both), (1.0, admittance)]
     return _with_own_beams(minus_quotient(base, h, both, middle, both))
+
+
+def add_layer_and_quotient(
+    stack: Bordered, admittance: Bordered, impedance: Bordered, tau: Float[Array, "*batch"]
+) -> tuple[Bordered, Quotient]:
+    """`add_layer`, and the quotient :math:`S^{-1}(Y + Y_e)` of light that goes down."""
+    h, both, middle = _sums(stack, admittance, impedance, tau)
+    base = [(1.0, both), (1.0, admittance)]
+    added, quotient = minus_and_quotient(base, h, both, middle, both)
+    return _with_own_beams(added), quotient
 
 
 def add_emitting_layer(

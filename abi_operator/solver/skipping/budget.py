@@ -96,6 +96,8 @@ class Expected(NamedTuple):
     through
         Share of the beam that meets nothing on its way to the ground and back: at least the slope
         in the albedo of a Lambertian ground. [-]
+    peaked
+        Of layers that are solved already (`plan.Plan`); None where there are none.
     """
 
     added: Float[Array, "view *batch"]
@@ -103,6 +105,7 @@ class Expected(NamedTuple):
     dark: Float[Array, "*batch"]
     aside: Float[Array, "*batch"]
     through: Float[Array, "*batch"]
+    peaked: Float[Array, "*batch"] | None = None
 
 
 def expected(

@@ -150,7 +150,9 @@ def planned(
     warm
         What is known of columns that emit.
     """
-    given, groups, peaked = layers, None, _peaked(layers)
+    given, groups, peaked = layers, None, peaked_columns(layers)
+    if known.peaked is not None:
+        peaked = jnp.maximum(peaked, known.peaked)
     # Few moments of such a phase function are as much below 0 as above: light scattered once, of
     # the whole function, says nothing of the rest.
     least = jnp.where(peaked > 1, known.dark, known.least)
@@ -177,7 +179,7 @@ def planned(
     return Plan(layers, doublings, given, groups, known, error_budget, peaked)
 
 
-def _peaked(layers: LayersOfModes) -> Float[Array, "*batch"]:
+def peaked_columns(layers: LayersOfModes) -> Float[Array, "*batch"]:
     """1 for columns of phase functions with forward peaks that the streams do not resolve, 2 for
     those with backward ones, of which delta-M leaves all that they are."""
     degrees = layers.moments[1]
