@@ -108,7 +108,8 @@ def estimates(
         Its solutions. [-]
     assumed
         What is not retrieved, with the covariance of its declarations; None for nothing. Where it
-        moves a plume, levels go with its edges unless the forward model says otherwise.
+        moves a plume, slopes are those of levels that go with its edges unless the forward model
+        says otherwise; what is left of the measurements is that of the model that found x.
     excess
         Whether what was measured is what x adds to the states, to which was added what the forward
         model makes of the states themselves (`fires`). Both depend on what is assumed, and its
@@ -124,16 +125,18 @@ def estimates(
     if prior is not None:
         prior = prior.of_pixels(len(x), forward.vector.names)
     about = None if assumed is None else assumed.prior(states).of_pixels(len(x), assumed.names)
+    solved = forward
     if assumed is not None and forward.plume_edges is None and assumed.moves_plumes(states):
         forward = replace(forward, plume_edges=True)
     rows = (prior, about, observations, states)
     rows = jax.tree.map(np.asarray, rows)
-    return map_chunks(lambda *chunk: _estimate_chunk((forward, assumed, excess), *chunk), *rows, x)
+    how = forward, solved, assumed, excess
+    return map_chunks(lambda *chunk: _estimate_chunk(how, *chunk), *rows, x)
 
 
 @Kept
 def _estimate_chunk(
-    how: tuple[ForwardModel, StateVector | None, bool],
+    how: tuple[ForwardModel, ForwardModel, StateVector | None, bool],
     prior: Prior | None,
     about: Prior | None,
     observations: Observation,
@@ -148,6 +151,7 @@ def _estimate_chunk(
 
 def _estimate(
     forward: ForwardModel,
+    solved: ForwardModel,
     assumed: StateVector | None,
     excess: bool,
     prior: Prior | None,
@@ -156,7 +160,7 @@ def _estimate(
     state: State,
     x: Float[Array, " x"],
 ) -> Estimate:
-    """One pixel's."""
+    """One pixel's; `solved` is the model that found x, of which no slopes are taken."""
     size = x.size
     parameters = x[:0] if about is None else jnp.asarray(about.x_prior)
 
@@ -187,6 +191,7 @@ def _estimate(
         smoothing = lack @ prior.S_prior @ lack.T
         _, determinant = jnp.linalg.slogdet(prior.S_prior @ inverse)
         information = determinant / (2 * jnp.log(2.0).astype(x.dtype))
+    left = residual if solved == forward else whitened(both, solved)
     # Whitened is the inverse of this, the root of S_obs, times what is measured.
     sigma = jnp.where(observation.present, jnp.asarray(observation.sigma, x.dtype), 1)
     root = sigma[:, None] * jnp.asarray(observation.root_correlation, x.dtype)
@@ -203,8 +208,8 @@ def _estimate(
         gain=jax.scipy.linalg.solve_triangular(root, gain.T, trans=1, lower=True).T,
         degrees_of_freedom=jnp.trace(kernel),
         information_content=information,
-        residual=residual,
-        chi_square=jnp.sum(residual**2),
+        residual=left,
+        chi_square=jnp.sum(left**2),
         nonlinearity=_nonlinearity(whitened, both, residual, jacobian, covariance),
     )
 

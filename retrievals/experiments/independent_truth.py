@@ -109,7 +109,7 @@ def independent_truth(
     error = np.array([[f.error.get(band, np.nan) for band in bands] for f in found])
     dims = ("quantity", "S_obs")
     words = {"units": "1", "long_name": "relative error of the forward model"}
-    variables = score_variables(retrieved, truth[:, None], sigma, dims) | {
+    variables = score_variables(retrieved, truth[:, None], sigma, dims, None) | {
         "truth": (("quantity", "pixel"), truth),
         "retrieved": ((*dims, "pixel"), retrieved),
         "sigma": ((*dims, "pixel"), sigma),

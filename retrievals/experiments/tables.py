@@ -23,7 +23,7 @@ def score_variables(
     truth: np.ndarray,
     sigma: np.ndarray,
     dims: Sequence[str],
-    units: str = "1",
+    units: str | None = "1",
     prefix: str = "",
 ) -> dict[str, tuple]:
     """Scores by case, as variables of a Dataset.
@@ -36,7 +36,7 @@ def score_variables(
     dims
         Of the cases.
     units
-        Of what was retrieved.
+        Of what was retrieved; None where cases have units of their own.
     prefix
         Of the names of the variables.
     """
@@ -51,8 +51,9 @@ def score_variables(
     for name, words in _SCORES.items():
         field = "num_pairs" if name == "num_pixels" else name
         values = np.array([getattr(s, field) for s in scores.ravel()]).reshape(shape)
-        about = {"units": units if name in _WITH_UNITS else "1", "long_name": words}
-        found[prefix + name] = (tuple(dims), values, about)
+        own = units if name in _WITH_UNITS else "1"
+        about = {"long_name": f"{words}, in the unit of each"} if own is None else {"units": own}
+        found[prefix + name] = (tuple(dims), values, {"long_name": words} | about)
     return found
 
 

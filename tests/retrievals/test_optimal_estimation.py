@@ -103,6 +103,28 @@ def test_of_an_excess_the_errors_are_those_of_the_difference(diagnosed):
         np.testing.assert_allclose(found.parameter_error[i, 0], error, rtol=1e-9)
 
 
+class Edged(Veil):
+    """A veil that is brighter, and steeper, where levels go with a plume's edges."""
+
+    def __call__(self, x, state):
+        return super().__call__(x, state) * (1.1 if self.plume_edges else 1)
+
+
+class Moved(GroundOf):
+    def moves_plumes(self, states):
+        return True
+
+
+def test_what_is_left_is_that_of_the_model_that_found_x(diagnosed):
+    """Slopes are those with edges, of which the solution knew nothing."""
+    whole, observation, ground, x, prior = diagnosed
+    moved = Moved(GROUND.quantities)
+    found = estimates(Edged(TWO.vector, plume_edges=None), observation, ground, x, prior, moved)
+    np.testing.assert_allclose(found.residual, whole.residual, rtol=EXACT)
+    np.testing.assert_allclose(found.chi_square, whole.chi_square, rtol=EXACT)
+    np.testing.assert_allclose(found.jacobian, 1.1 * whole.jacobian, rtol=EXACT)
+
+
 def test_the_linearity_test_sees_curvature(diagnosed):
     found, observation, ground, x, _ = diagnosed
     variances, axes = np.linalg.eigh(found.posterior_covariance[0])

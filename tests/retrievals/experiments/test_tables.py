@@ -18,6 +18,9 @@ def test_scores_by_case_leave_out_what_did_not_converge():
     np.testing.assert_array_equal(found["t_coverage_68"], [1, 0])
     np.testing.assert_allclose(found["t_chi_square"], [0.25, 2.25])
     assert found["t_rmse"].attrs["units"] == "K"
+    mixed = score_variables(retrieved, truth, sigma, ("case",), None)
+    assert "units" not in mixed["bias"][2] and "unit of each" in mixed["bias"][2]["long_name"]
+    assert mixed["chi_square"][2]["units"] == "1"
 
 
 def test_a_table_has_a_line_for_each_case():
