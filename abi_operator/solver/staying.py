@@ -6,7 +6,7 @@ error budget hangs on.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,12 +18,13 @@ from .column import OWN_AXES, Column, Options
 from .foreknown import depths_of
 from .gradient.modes import Mode, every_mode
 from .lit import weights_of_modes
-from .method.around import Above, above, put_on
+from .method.around import Above, HalfLayer, above, put_on
 from .method.azimuth import legendre_tables, weighted_moments
 from .method.bordered import Bordered
+from .method.doublings import Doublings
 from .method.ground import black
-from .method.layer import half_layer
-from .method.mode_layers import read
+from .method.layer import ModeKernels, half_layer
+from .method.mode_layers import Layers, Order, read
 from .method.single_scatter import direct_transmission
 from .method.surface import AnySurface
 from .problem import Problem, seen_at_once
@@ -120,11 +121,15 @@ def _parts(tile: Column, upper: Problem | None, lower: Problem | None, options: 
     weights = weights_of_modes(options.num_modes, tile.relative_azimuth)
     beams = legendre_tables(num_streams, options.num_modes, cosines).beams
 
+    half = _half_layer(not options.tms)
+    numbers_above, numbers_below = (_numbers(x, cosines) for x in (upper, lower))
+
     def of_mode(mode: Mode) -> tuple[Above, Bordered]:
+        # Of a part without layers those of the other are looked at, and none is solved.
+        on_top, beneath = (_of_mode(x or any_of_both, mode) for x in (upper, lower))
         nothing = black(cosines, num_streams)
-        on_top = above(nothing, *_half_layers(upper, mode, cosines, options))
-        half, numbers = _half_layers(lower, mode, cosines, options)
-        return on_top, put_on(mode.below(mean), half, numbers[::-1])
+        found = above(nothing, half, on_top, numbers_above)
+        return found, put_on(mode.below(mean), half, beneath, numbers_below[::-1])
 
     every = every_mode(mean, others, weights, beams, num_streams // 2)
     on_top, below = jax.lax.map(of_mode, every)
@@ -141,25 +146,34 @@ def _parts(tile: Column, upper: Problem | None, lower: Problem | None, options: 
     )
 
 
-def _half_layers(problem: Problem | None, mode: Mode, cosines: Array, options: Options) -> Any:
-    """`method.around.HalfLayer` of one mode, and the numbers of the layers."""
-    if problem is None:
-        return _no_layer(cosines, options), jnp.zeros(0, cosines.dtype)
-    layers, kernels, views = _layers(problem).as_layers(), mode.kernels(), 1 / cosines[1:]
+class _OfMode(NamedTuple):
+    """What one mode sees of layers."""
 
-    def half(number: Array) -> tuple[Bordered, Bordered, Array]:
-        layer = layers.layer(number, mode.order.odd)
-        a, p = layer.matrices(mode.order.mean, kernels, views, not options.tms)
-        own = jax.tree.map(lambda x: read(x, number), problem.doublings)
-        return *half_layer(a, p, layer.tau, own), layer.tau
-
-    return half, jnp.arange(layers.tau.shape[0], dtype=cosines.dtype)
+    layers: Layers
+    doublings: Doublings
+    order: Order
+    kernels: tuple[ModeKernels, ModeKernels]
+    view_secants: Float[Array, "view *batch"]
 
 
-def _no_layer(cosines: Array, options: Options) -> Any:
-    """Such a function of no layers, of which only shapes are asked."""
-    nothing = black(cosines, options.num_streams)
-    return lambda number: (nothing, nothing, number * cosines[0])
+def _of_mode(problem: Problem, mode: Mode) -> _OfMode:
+    view_secants = 1 / problem.directions.cosines[1:]
+    layers = _layers(problem).as_layers()
+    return _OfMode(layers, problem.doublings, mode.order, mode.kernels(), view_secants)
+
+
+def _half_layer(single_scattering: bool) -> HalfLayer:
+    def of_one(of: _OfMode, number: Array) -> tuple[Bordered, Bordered, Array]:
+        layer = of.layers.layer(number, of.order.odd)
+        how = of.order.mean, of.kernels, of.view_secants, single_scattering
+        own = jax.tree.map(lambda x: read(x, number), of.doublings)
+        return *half_layer(*layer.matrices(*how), layer.tau, own), layer.tau
+
+    return of_one
+
+
+def _numbers(problem: Problem | None, like: Array) -> Float[Array, " layer"]:
+    return jnp.arange(0 if problem is None else problem.layers.tau.shape[0], dtype=like.dtype)
 
 
 def _layers(problem: Problem) -> LayersOfModes:

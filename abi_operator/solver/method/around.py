@@ -25,11 +25,12 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import matmul, total
 from ...machine.elimination import inverse
+from ...machine.kernels import one_kernel
 from .adding import add_layer, add_layer_and_quotient, top
 from .bordered import Bordered
 
-HalfLayer = Callable[[Any], tuple[Bordered, Bordered, Array]]
-"""Half-layer admittance, impedance and thickness of a layer by its number."""
+HalfLayer = Callable[[Any, Array], tuple[Bordered, Bordered, Array]]
+"""Half-layer admittance, impedance and thickness of one of some layers by its floating number."""
 
 
 class Above(NamedTuple):
@@ -67,20 +68,25 @@ class Above(NamedTuple):
         return self.reflected - 0.5 * seen, nodes
 
 
-def put_on(stack: Bordered, half_layer: HalfLayer, numbers: Float[Array, " layer"]) -> Bordered:
+def put_on(
+    stack: Bordered, half_layer: HalfLayer, layers: Any, numbers: Float[Array, " layer"]
+) -> Bordered:
     """A stack with layers of these numbers on it, one after the other."""
 
-    def one(stack, number):
-        return add_layer(stack, *half_layer(number)), None
+    def one(stack, layers, number):
+        return add_layer(stack, *half_layer(layers, number))
 
-    return jax.lax.scan(one, stack, numbers)[0]
+    one = _compiled(one, stack, numbers)
+    return jax.lax.scan(lambda x, number: (one(x, layers, number), None), stack, numbers)[0]
 
 
-def above(black: Bordered, half_layer: HalfLayer, numbers: Float[Array, " layer"]) -> Above:
+def above(
+    black: Bordered, half_layer: HalfLayer, layers: Any, numbers: Float[Array, " layer"]
+) -> Above:
     """Layers of these numbers, top first, above others; `black` is the admittance of free space."""
 
-    def up(stack, number):
-        admittance, impedance, tau = half_layer(number)
+    def one(stack, layers, number):
+        admittance, impedance, tau = half_layer(layers, number)
         stack, quotient = add_layer_and_quotient(stack, admittance, impedance, tau)
         return stack, (quotient.core.joined(), quotient.border.joined(), quotient.ratio, 0.5 * tau)
 
@@ -90,12 +96,24 @@ def above(black: Bordered, half_layer: HalfLayer, numbers: Float[Array, " layer"
         nodes = nodes - h * (matmul(core, nodes) + border * own)
         return (nodes, own - h * ratio * own), None
 
+    one = _compiled(one, black, numbers)
+    up = lambda x, number: one(x, layers, number)  # noqa: E731
     stack, steps = jax.lax.scan(up, black, numbers, reverse=True)
     closed = top(stack)
     light = -matmul(closed.inverse, stack.border), jnp.ones_like(stack.diagonal)
     (nodes, own), _ = jax.lax.scan(down, light, steps)
-    from_below = put_on(black, half_layer, numbers)
+    from_below = put_on(black, half_layer, layers, numbers)
     return Above(from_below.core, nodes, own, closed.reflection())
+
+
+def _compiled(
+    function: Callable[..., Any], stack: Bordered, numbers: Float[Array, " layer"]
+) -> Callable[..., Any]:
+    """As one kernel, but of the only layer, whose number would be of no use (`machine.kernels`)."""
+    if len(numbers) < 2:
+        return function
+    num_nodes, num_beams = stack.border.shape[:2]
+    return one_kernel(function, num_nodes, in_parts=True, num_beams=num_beams)
 
 
 def _identity(core: Float[Array, "node node *batch"]) -> Float[Array, "node node *#batch"]:
