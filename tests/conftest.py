@@ -61,12 +61,26 @@ def pytest_addoption(parser):
     parser.addoption(
         "--every", type=int, default=1, metavar="N", help="of the slow studies run one in N"
     )
+    parser.addoption(
+        "--first", type=int, default=0, metavar="K", help="the first of those, modulo N"
+    )
+
+
+def pytest_report_header(config):
+    """Which of the slow studies are drawn, so that the same can be drawn again."""
+    every = config.getoption("--every")
+    if every > 1:
+        return f"slow studies: one in {every}, from {config.getoption('--first') % every} on"
 
 
 def pytest_collection_modifyitems(config, items):
-    """One in so many of the slow studies, in their order: what they take is compiling."""
+    """One in so many of the slow studies, in their order: what they take is compiling.
+
+    From another one on in every commit (`.ci/run`), so that in time all of them run.
+    """
     slow = [item for item in items if item.get_closest_marker("slow")]
-    left_out = set(slow) - set(slow[:: config.getoption("--every")])
+    every = config.getoption("--every")
+    left_out = set(slow) - set(slow[config.getoption("--first") % every :: every])
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]

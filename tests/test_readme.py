@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 import stress_columns
 from readme import README, run_block
 
@@ -13,6 +14,7 @@ from abi_operator.ranges import SOLVER, STATE, WEATHER
 ROOT = Path(__file__).parents[1]
 
 
+@pytest.mark.slow
 def test_the_operators_blocks_run():
     names = run_block(1)
     slope = names["K"].atmosphere.plumes["smoke"].ssa["C01"]
@@ -23,6 +25,7 @@ def test_the_operators_blocks_run():
     assert seen.saturated and abs(seen.brightness_temperature - 411.86) < 0.01
 
 
+@pytest.mark.slow
 def test_the_solvers_block_runs():
     names = run_block(3)
     # Two solves of the same columns, in one of which the ground is a closed form.
@@ -34,6 +37,15 @@ def test_the_solvers_block_runs():
 def test_the_test_line_is_the_one_of_the_full_check():
     (line,) = re.findall(r"python (-P -m pytest .*)\n", README)
     assert f'"$python" {line}\n' in (ROOT / ".ci" / "run").read_text()
+
+
+def test_what_the_full_check_asks_by_name_is_there():
+    """A test of another name would be left out without a word."""
+    named = set(re.findall(r"\btest_\w+(?:\.py)?", (ROOT / ".ci" / "run").read_text()))
+    paths = list((ROOT / "tests").rglob("test_*.py"))
+    written = "".join(path.read_text() for path in paths)
+    found = {path.name for path in paths} | set(re.findall(r"^def (test_\w+)", written, re.M))
+    assert len(named) > 10 and named <= found, named - found
 
 
 def test_files_and_commands_that_it_names_exist():

@@ -11,6 +11,7 @@ from abi_operator.files import read_result
 from abi_operator.nomenclature import QUALITY_FLAGS
 
 
+@pytest.mark.slow
 @pytest.mark.real
 def test_hurricane_katrina(invoke, tmp_path, monkeypatch):
     """All four times of a real WRF file, the first of them at sunrise, in two kinds of band.
