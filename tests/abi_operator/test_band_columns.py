@@ -168,6 +168,7 @@ def test_forward_mode_equals_reverse():
     np.testing.assert_allclose(forward(inputs, direction), along, rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_values_of_clouds():
     """Of arrays that all bands share."""
     inputs = cloudy()

@@ -55,9 +55,9 @@ def by_hand(state, band, gases=ALL_GASES, **emission):
     return np.sum(np.asarray(weight * terms))
 
 
-def expected(gases):
+def expected(gases, bands=SEEN):
     """Reflectances of the state in the bands that are seen."""
-    return [by_hand(make_state(), band, gases) for band in SEEN]
+    return [by_hand(make_state(), band, gases) for band in bands]
 
 
 @pytest.mark.slow
@@ -109,5 +109,6 @@ def test_derivatives_to_weights_and_wind():
 def test_batches_repeat_what_is_one_number():
     batch = stacked([make_state(), make_state()])
     batch = eqx.tree_at(lambda s: s.albedo["C02"].f_geo, batch, jnp.asarray(0.03))
-    found = brf(batch, SEEN, gases=(), **OPTIONS)
-    np.testing.assert_allclose(found, [expected(())] * 2, rtol=1e-12)
+    rough = SEEN[:2]  # all of them by `test_equals_the_solver_called_by_hand`
+    found = brf(batch, rough, gases=(), **OPTIONS)
+    np.testing.assert_allclose(found, [expected((), rough)] * 2, rtol=1e-12)

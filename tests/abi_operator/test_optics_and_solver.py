@@ -65,6 +65,7 @@ def test_tiles_do_not_show(monkeypatch):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-18)
 
 
+@pytest.mark.slow
 def test_doublings_are_enough_or_the_column_is_not_a_number():
     """Of a layer of 1800 the value is exact, and slopes are NaN where it cannot be read."""
     state = columns(2)

@@ -170,6 +170,7 @@ def with_nothing_above(air, count=4):
     )
 
 
+@pytest.mark.slow
 def test_reflectances_hardly_move():
     """By under 1e-4 in C01 to C06, of levels 400 m apart that a plume's edges do not meet.
 

@@ -35,6 +35,7 @@ def solved(*states):
     return np.asarray(brf(stacked(states), **OPTIONS))
 
 
+@pytest.mark.slow
 def test_equals_cdisort_on_layers_built_from_published_numbers():
     """Rayleigh and smoke at 1-3 km over grey ground, layers mixed in NumPy, no optics of ours."""
     state = column(liquid=0.0)

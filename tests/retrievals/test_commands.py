@@ -86,6 +86,7 @@ def test_a_prior_from_a_file_and_diagnostics(folder, run):
         assert written.attrs["prior"] == "normal distribution"
 
 
+@pytest.mark.slow
 def test_an_image_is_retrieved_as_a_whole(folder, run):
     result, out = folder / "result.nc", folder / "smooth.nc"
     answer = run("retrieve", "smoke", result, "--out", out, "--noise", "--smooth", "1.5")

@@ -10,6 +10,7 @@ import pytest
 STREAMS = 2
 
 
+@pytest.mark.slow
 def test_a_state_vector_of_ones_own():
     found = own_state_vector.study(STREAMS)
     off = np.abs(found["retrieved"] - found["truth"]) / found["sigma"]
@@ -17,6 +18,7 @@ def test_a_state_vector_of_ones_own():
     assert (found["sigma"] < 0.2).all()  # less than the priors'
 
 
+@pytest.mark.slow
 def test_bands_add_information_the_less_the_more_there_are():
     told = information_content.study(STREAMS)
     assert sorted(band for band, *_ in told) == sorted(information_content.BANDS)

@@ -44,6 +44,7 @@ def test_smoke_is_recovered_over_every_ground(simulated, retrieval):
     assert retrieval.attrs["num_streams"] == 2
 
 
+@pytest.mark.slow
 def test_single_scattering_albedo_is_recovered_with_it(make_result):
     simulated = make_result(aod_550=(0.9, 2.0), ssa_shift=0.35)
     truth = simulated["smoke_ssa"].copy()

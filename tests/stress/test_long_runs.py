@@ -8,6 +8,7 @@ from long_runs_commands import Place, killed
 from long_runs_operator import COUNT, answer, answers, same
 
 
+@pytest.mark.slow
 def test_threads_get_the_numbers_of_one():
     """Values and gradients of the operator, of calls with other numbers of columns at once."""
     found = answers("threads")

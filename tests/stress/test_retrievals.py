@@ -67,12 +67,16 @@ def test_bands_that_are_missing_make_less_observable_and_none_invalid():
     assert 0 < lost[0] < lost[1]
 
 
-@pytest.mark.parametrize("kind", ["smoke", "fire", pytest.param("cloud", marks=SLOW)])
+@pytest.mark.parametrize(
+    "kind", ["smoke", *(pytest.param(kind, marks=SLOW) for kind in ("fire", "cloud"))]
+)
 def test_nothing_measured_is_no_input(kind):
     assert codes_of("all bands missing", kind).share(ResultCode.INVALID_INPUT) == 1
 
 
-@pytest.mark.parametrize("kind", ["smoke", "fire", pytest.param("cloud", marks=SLOW)])
+@pytest.mark.parametrize(
+    "kind", ["smoke", *(pytest.param(kind, marks=SLOW) for kind in ("fire", "cloud"))]
+)
 def test_bounds_alone_are_no_poor_fit_and_no_success(kind):
     """What saturates in all bands is explained by anything that is bright enough."""
     found = codes_of("all bands saturated", kind)
@@ -88,6 +92,7 @@ def test_a_pixel_that_is_no_number_moves_no_other():
     np.testing.assert_allclose(holed.departures[1::2], clean.departures[1::2], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_codes_of_ash_are_true():
     """Its optics by radius: no success of what is not told, and none that is no number."""
     seen, wrong, empty = (
@@ -101,6 +106,7 @@ def test_codes_of_ash_are_true():
         assert found.finite[found.success].all()
 
 
+@pytest.mark.slow
 def test_a_fire_is_held_by_its_errors():
     """Also where some of the drawn fires saturate all bands: what is no number must show behind a
     bound as well."""
@@ -114,6 +120,7 @@ def test_a_fire_is_held_by_its_errors():
     np.testing.assert_array_equal(holed.codes[1::2], quiet.codes[1::2])
 
 
+@pytest.mark.slow
 def test_what_was_wrong_about_a_fires_pixel_is_a_poor_fit():
     for name, share in (
         ("the same, not told", 0.5),

@@ -187,6 +187,7 @@ def test_sixteen_streams(columns):
     assert_equal(np.asarray(ours), np.array(reference), few, bands)
 
 
+@pytest.mark.slow
 def test_own_layers_through_cdisort(columns, states, reflected, streams):
     """Wiring: what the operator solves are the layers of `column_optics`, all terms of them."""
     rows, bands = np.arange(0, len(columns), 7), ("C02", "C04", "C07")

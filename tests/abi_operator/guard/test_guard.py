@@ -69,6 +69,7 @@ def test_values_and_jacobians_are_those_of_the_operator(evaluated):
     assert units["atmosphere.liquid.number_path[0]"] == "m-2"
 
 
+@pytest.mark.slow
 def test_doublings_are_enough(evaluated):
     """The number that the guard takes, against the one for any layer at all."""
     many = guard.evaluate(two_columns(), BANDS, num_doublings=14, **SETTINGS)

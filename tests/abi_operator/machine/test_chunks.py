@@ -146,7 +146,9 @@ MOST = 600
 inside_jit = jax.jit(jax.value_and_grad(total, argnums=PLACES))
 
 
-@pytest.mark.parametrize("size", [5, pytest.param(100, marks=pytest.mark.slow), MOST])
+@pytest.mark.parametrize(
+    "size", [*(pytest.param(n, marks=pytest.mark.slow) for n in (5, 100)), MOST]
+)
 def test_values_and_slopes_are_those_inside_jit(size):
     every = [jnp.asarray(x) for x in arguments(MOST)]
     columns = [x[:size] if x.ndim else x for x in every]

@@ -41,7 +41,7 @@ def total(weight, *columns):
 values_and_slopes = jax.value_and_grad(total, argnums=PLACES, has_aux=True)
 
 
-@pytest.mark.parametrize("size", [3, 64, MOST])
+@pytest.mark.parametrize("size", [3, pytest.param(64, marks=pytest.mark.slow), MOST])
 @pytest.mark.parametrize("given", [np.asarray, jnp.asarray])
 def test_values_and_slopes_are_those_of_a_cpu(size, given, request):
     """Of a CPU by one program: columns that are not there weigh nothing."""

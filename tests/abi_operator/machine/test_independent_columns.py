@@ -359,7 +359,8 @@ def solver_columns(count):
     return [jnp.asarray(x) for x in small_columns(count)]
 
 
-@pytest.mark.parametrize("several", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.slow  # `test_gradients` maps the solver's Jacobians
+@pytest.mark.parametrize("several", [False, True])
 def test_solver_mapped_is_the_batch_in_value_and_gradient(several):
     """With one view and with two: compiled as a whole of more columns than a tile has, and as the
     batch in chunks.
@@ -379,6 +380,7 @@ def test_solver_mapped_is_the_batch_in_value_and_gradient(several):
     close(mapped, batch, rtol=REAL_ROUNDING)
 
 
+@pytest.mark.slow
 def test_slopes_choose_their_doublings():
     """From the thickest layer, where columns can be read: as with a number that suffices."""
     given = solver_columns(3)
@@ -392,6 +394,7 @@ def test_slopes_choose_their_doublings():
     close(*slopes, rtol=REAL_ROUNDING)
 
 
+@pytest.mark.slow
 def test_sunlight_and_emission_together():
     given = solver_columns(3)
     rng = np.random.default_rng(4)

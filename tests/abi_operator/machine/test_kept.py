@@ -170,6 +170,7 @@ def test_what_was_written_is_read(monkeypatch, tmp_path):
     np.testing.assert_array_equal(found[0], found[2])
 
 
+@pytest.mark.slow
 def test_what_is_kept_has_been_compiled_and_not_read_from_jax(tmp_path):
     """XLA writes programs that it has read, as after an update of the package, without kernels."""
     place = tmp_path / "packages"

@@ -61,8 +61,11 @@ def test_plain_jax_maps_columns():
     expected = solve(*given)
     with plain_jax():
         close(jax.jit(solve)(*given), expected, MAPPED)
+        none = [x[:0] for x in given]
+        assert toa_brf(*none, num_streams=2).shape == (0,)
 
 
+@pytest.mark.slow
 def test_plain_jax_is_for_the_operator_too():
     """Whose bands then are solved without any of their rules, mapped over columns or of none."""
     state = column(num_layers=2)
@@ -82,8 +85,6 @@ def test_plain_jax_is_for_the_operator_too():
     expected = solve(*given)
     with plain_jax():
         close(jax.jit(solve)(*given), expected, MAPPED)
-        none = [x[:0] for x in small_columns()]
-        assert toa_brf(*none, num_streams=2).shape == (0,)
 
 
 def test_the_switch_is_on_again_after_the_last_block_and_after_trouble(monkeypatch):

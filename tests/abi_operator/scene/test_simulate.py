@@ -89,6 +89,7 @@ def test_a_cloud_scatters_as_asked_and_the_result_says_how(made):
     assert (cloudy > 1e-3).all() and (clear < ROUNDING).all()
 
 
+@pytest.mark.slow
 def test_ice_is_smooth_or_rough(warm):
     """Asymmetry factors of 0.90 and 0.92 in C07, for these of 30 um."""
     rough = simulate(warm.assign_attrs(ice_optics="rough"), bands=("C07",), **OPTIONS)

@@ -285,6 +285,7 @@ def test_second_derivatives(order):
         )
 
 
+@pytest.mark.slow
 def test_single_precision():
     """Finite everywhere, empty layers included, and as accurate as the type allows."""
     how = {"num_doublings": 1, "single_scattering": True}

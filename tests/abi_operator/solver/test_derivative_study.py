@@ -170,6 +170,7 @@ def assert_study(seeds, count, num_streams, single_scattering):
     assert undecided <= UNDECIDED
 
 
+@pytest.mark.slow
 def test_derivatives_of_random_columns():
     assert_study([SEED], 8, 4, "tms")
 

@@ -32,14 +32,15 @@ def plain(column, how):
     return (column.solar_irradiance * column.mu0 / np.pi * brf + emitted)[0]
 
 
+@pytest.mark.slow  # differences, below, and forward mode of the sun's part in `test_adjoint`
 @pytest.mark.parametrize(
     ("num_streams", "num_doublings", "tms", "general"),
     [
         (2, 2, True, True),
-        pytest.param(2, 0, False, False, marks=pytest.mark.slow),
-        pytest.param(4, 3, False, True, marks=pytest.mark.slow),
-        pytest.param(6, 3, True, False, marks=pytest.mark.slow),
-        pytest.param(8, 4, True, True, marks=pytest.mark.slow),
+        (2, 0, False, False),
+        (4, 3, False, True),
+        (6, 3, True, False),
+        (8, 4, True, True),
     ],
 )
 def test_equals_forward_mode(num_streams, num_doublings, tms, general):
@@ -137,6 +138,7 @@ def test_one_layer_alone():
         np.testing.assert_allclose(found, expected, rtol=0, atol=atol, err_msg=name)
 
 
+@pytest.mark.slow
 def test_single_precision():
     """Finite and as accurate as the type allows, in the empty layer with its jump, too."""
     expected, slopes = BOTH(*arguments())

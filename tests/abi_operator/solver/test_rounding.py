@@ -61,6 +61,7 @@ def test_layers_deeper_than_anything_that_is_seen(depth, ssa):
     np.testing.assert_allclose(rounded, double, rtol=BUDGET / 4)  # 6e-4 and more if they were
 
 
+@pytest.mark.slow
 def test_peaks_that_are_cut_off_stay_in_double_precision():
     """Without delta-M no matrix is sure to be positive in single precision."""
     rough = columns() | {

@@ -134,6 +134,7 @@ def test_slopes_in_moments_of_high_degree():
     assert np.quantile(wrong, 0.99) < 0.01
 
 
+@pytest.mark.slow
 def test_the_same_inside_of_everything():
     """Under `jax.jit`, mapped one by one and with the others in another order: what is left out for
     a column hardly depends on any other."""
@@ -170,6 +171,7 @@ def test_a_column_without_numbers_spoils_no_other():
         np.testing.assert_allclose(slope[rest], wanted[rest], atol=ALONE * np.abs(wanted).max())
 
 
+@pytest.mark.slow
 def test_two_views_at_once():
     """Both get what each gets alone, within the budget."""
     given, views = dict(columns()), np.array([0.5, 0.9])
@@ -321,6 +323,7 @@ def test_a_thin_black_layer_is_not_spread_through_a_thick_white_one():
     np.testing.assert_array_equal(groups.labels[:, 0], np.arange(LAYERS) > 0)
 
 
+@pytest.mark.slow
 def test_one_layer_and_more_columns_than_a_tile():
     """Columns are put in order by their groups, of which there is one."""
     one = {k: x[:, :1] if np.ndim(x) > 1 else x for k, x in columns().items()}

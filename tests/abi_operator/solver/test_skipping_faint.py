@@ -5,6 +5,7 @@ from functools import cache
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from abi_operator.solver import toa_brf, toa_radiance
 from abi_operator.solver.glimpse import Glimpse
@@ -139,6 +140,7 @@ def test_what_a_column_may_be():
     assert np.quantile(wrong, 0.99) < 0.5 * BUDGET
 
 
+@pytest.mark.slow
 def test_light_is_rounded_where_the_budget_has_room(monkeypatch):
     """Of columns that are not solved it is that of single precision, within its rounding; here
     whatever is solved is no number."""
@@ -182,6 +184,7 @@ def test_slopes_are_those_of_a_solution(monkeypatch):
     np.testing.assert_allclose(found, slope(BUDGET * (1 + 3e-9)), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_light_from_above_is_solved():
     """Air reflects it as well, which nobody has counted."""
     from_above = warm(columns(scattered=3e-4)) | {"isotropic_top": np.ones(130)}

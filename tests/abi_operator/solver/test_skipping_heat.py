@@ -81,6 +81,7 @@ def test_light_of_fires_below_and_on_the_top_is_counted():
         assert 0 < np.quantile(wrong, 0.99) < 1e-3 and wrong.max() < 1e-2
 
 
+@pytest.mark.slow
 def test_modes_do_not_end_where_a_cosine_is_small():
     """Where the second is nothing by its azimuth it says nothing of the third: without heat as many
     are solved as of a reflectance."""
