@@ -132,6 +132,7 @@ def test_batches_are_columns_and_night_is_dark():
     assert np.isnan(traced).all()  # a sun that is nowhere is not below the horizon
 
 
+@pytest.mark.slow
 def test_derivatives_in_temperatures_and_fire():
     state = make_state(fire=Fire(jnp.asarray(0.01), jnp.asarray(800.0)))
     moved = (

@@ -105,6 +105,7 @@ def test_it_is_that_of_the_sphere_down_to_the_horizon():
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_differences():
     """By the sun's angle and by a plume's extinction, forwards and backwards."""
     state = columns([68.0], True, {"smoke": smoke(0.5, bands=NAMES)})

@@ -102,6 +102,7 @@ def test_compiled_and_mapped_it_is_the_gradient_of_the_batch():
         np.testing.assert_allclose(found, expected, rtol=0, atol=atol, err_msg=name)
 
 
+@pytest.mark.slow
 def test_two_views_have_the_slopes_of_each_alone():
     inputs = arguments()
     mu, azimuth = inputs[5:7]

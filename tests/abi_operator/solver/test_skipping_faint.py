@@ -168,6 +168,7 @@ def test_thermal_light_of_faint_columns():
     assert np.max(np.abs(found - whole) / whole) < BUDGET / 4
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_a_solution(monkeypatch):
     """As if no column were faint."""
     given = columns(scattered=1e-4)
