@@ -83,6 +83,7 @@ def test_over_any_ground_under_a_sun_of_its_own_in_each_layer():
     np.testing.assert_allclose(found, toa_brf(*columns, **own, **how), rtol=SAME)
 
 
+@pytest.mark.slow
 def test_single_scattering_may_be_left_to_the_streams():
     columns, how = standard_columns(), {"single_scattering": None, "num_modes": 3} | STREAMS
     _, changing = parts(columns)
@@ -90,6 +91,7 @@ def test_single_scattering_may_be_left_to_the_streams():
     np.testing.assert_allclose(found, toa_brf(*columns, **how), rtol=SAME)
 
 
+@pytest.mark.slow
 def test_any_number_of_layers_goes_between():
     """None but an empty one, and those of another column as well."""
     columns = standard_columns()
