@@ -76,7 +76,7 @@ def pytest_report_header(config):
 def pytest_collection_modifyitems(config, items):
     """One in so many of the slow studies, in their order: what they take is compiling.
 
-    From another one on in every commit (`.ci/run`), so that in time all of them run.
+    From another one on with every change of the package (`.ci/run`): in time all of them run.
     """
     slow = [item for item in items if item.get_closest_marker("slow")]
     every = config.getoption("--every")
