@@ -2,11 +2,12 @@
 
 A discrete-ordinate solver in JAX for plane-parallel layers, batched and differentiable in every
 input. `toa_brf` gives reflectances, `toa_radiance` radiances with thermal emission beside the sun,
-`toa_albedo` the share of sunlight sent back, and `surface_coupling` the reflectance as a closed
-form in the ground's albedo. The ground is an albedo or a `Surface` of your own. Callers whose phase
-functions are sharp pass them at the scattering angle (`cos_scattering_angle`), from closed forms or
-from tables (`interpolate_phase_function`, `mix_phase_functions`). How exactly to solve is told to
-all of them by name (`Settings`). It knows nothing of aerosols, instruments or files.
+`toa_albedo` the share of sunlight sent back, `surface_coupling` the reflectance as a closed form in
+the ground's albedo, and `surroundings` what lies above and below layers that change. The ground is
+an albedo or a `Surface` of your own. Callers whose phase functions are sharp pass them at the
+scattering angle (`cos_scattering_angle`), from closed forms or from tables
+(`interpolate_phase_function`, `mix_phase_functions`). How exactly to solve is told to all of them
+by name (`Settings`). It knows nothing of aerosols, instruments or files.
 """
 
 from .albedo import SurfaceCoupling as SurfaceCoupling
