@@ -45,25 +45,34 @@ def test_layers_need_not_lie_between(first, last):
     np.testing.assert_allclose(found, toa_brf(*columns, **FEW), rtol=SAME)
 
 
-def whole_sum(tau, ssa, moments, others, **how):
-    return jnp.sum(toa_brf(tau, ssa, moments, *others, **STREAMS | how))
-
-
 def test_slopes_are_those_of_the_whole_column():
-    """Forward and reverse."""
-    columns = standard_columns()
-    _, changing = parts(columns)
-    solved = around(columns)
-    found = jax.grad(lambda *x: jnp.sum(solved.brf(*x)), (0, 1, 2))(*changing)
-    whole = jax.grad(whole_sum, (0, 1, 2))(*columns[:3], columns[3:])
-    for own, of_all in zip(found, whole, strict=True):
-        expected = np.asarray(of_all)[:, FIRST:LAST]
-        scale = np.abs(of_all).max()
-        np.testing.assert_allclose(own, expected, rtol=1e-9, atol=SAME * scale)
-    directions = [np.cos(np.arange(x.size)).reshape(x.shape) for x in changing]
-    _, forward = jax.jvp(lambda *x: jnp.sum(solved.brf(*x)), tuple(changing), tuple(directions))
-    reverse = sum(jnp.vdot(a, b) for a, b in zip(found, directions, strict=True))
+    """Forward and reverse, in every argument."""
+    columns, rng = standard_columns(), np.random.default_rng(8)
+    names = ("tau", "ssa", "moments", "secant", "phase_function")
+    whole = dict(zip(names, columns[:3], strict=False))
+    whole |= {name: rng.uniform(1.1, 3, columns[0].shape) for name in names[3:]}
+    changing = {name: x[:, FIRST:LAST] for name, x in whole.items()}
+    stay = {name: np.delete(x, np.s_[FIRST:LAST], axis=1) for name, x in whole.items()}
+    given = dict(zip(("albedo", "mu0", "mu", "relative_azimuth"), columns[3:], strict=True))
+    solved = surroundings(**stay, **given, num_above=FIRST, **STREAMS)
+    found = jax.grad(lambda x: jnp.sum(solved.brf(**x)))(changing)
+    of_all = jax.grad(lambda x: jnp.sum(toa_brf(**x, **given, **STREAMS)))(whole)
+    for name in names:
+        expected = np.asarray(of_all[name])[:, FIRST:LAST]
+        scale = np.abs(of_all[name]).max()
+        assert scale > 0
+        np.testing.assert_allclose(found[name], expected, rtol=1e-9, atol=SAME * scale)
+    along = {name: np.cos(np.arange(x.size)).reshape(x.shape) for name, x in changing.items()}
+    _, forward = jax.jvp(lambda x: jnp.sum(solved.brf(**x)), (changing,), (along,))
+    reverse = sum(jnp.vdot(found[name], along[name]) for name in names)
     np.testing.assert_allclose(forward, reverse, rtol=SAME)
+
+
+def test_what_is_kept_does_not_grow_with_layers():
+    """m (2 n^2 + 4 n + 4) numbers and eight more."""
+    modes, nodes = STREAMS["num_streams"], STREAMS["num_streams"] // 2
+    count = around(standard_columns()).numbers.shape[-1]
+    assert count == modes * (2 * nodes**2 + 4 * nodes + 4) + 8
 
 
 def test_over_any_ground_under_a_sun_of_its_own_in_each_layer():
