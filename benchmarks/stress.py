@@ -135,7 +135,7 @@ def judged(task):
     return stress_truth.error(batch.columns, row, group[0], value)
 
 
-def beside_truth(rows, where, precision, count, most_streams=8, most_layers=16):
+def beside_truth(rows, where, precision, count, most_streams=16, most_layers=200):
     """The worst columns against 40 digits."""
     cheap = [k for k, g in enumerate(GROUPS) if g[0] <= most_streams and g[1] <= most_layers]
     chosen = np.flatnonzero(np.isin(where[:, 0], cheap) & ~rows["beyond"])

@@ -7,11 +7,12 @@ from math import ceil, log2
 
 from flint import arb, arb_mat
 
-# The series starts where h / mu is at most START, so that the norm of X = h^2 B A is below 1/16
-# and the first neglected term, X^20 / 40!, below 1e-71. The exponential is squared until h / mu
-# reaches EXPONENT, which costs 21 digits; from there reflection and transmission are doubled.
+# The series starts where h / mu is at most START, so that the norm of X = h^2 B A is about 1/16 and
+# the first neglected term, X^24 / 48!, about 1e-90: less than balls of 77 digits lose by rounding.
+# The exponential is squared until h / mu reaches EXPONENT, which costs 21 digits; from there
+# reflection and transmission are doubled.
 START = 1 / 8
-TERMS = 20
+TERMS = 24
 EXPONENT = 16
 
 
@@ -20,8 +21,14 @@ def identity(size: int) -> arb_mat:
 
 
 def _cosh_sinh(x: arb_mat, one: arb_mat) -> tuple[arb_mat, arb_mat]:
-    """Sums over k of X^k / (2k)! and X^k / (2k + 1)!, four powers at a time."""
+    """Sums over k of X^k / (2k)! and X^k / (2k + 1)!, four powers at a time.
+
+    What is neglected is less than twice its first term, of which the largest sum over a row of X
+    gives a bound; every ball is widened by it.
+    """
     square = x * x
+    norm = max((sum((abs(v) for v in row), arb(0)).upper() for row in x.tolist()), default=arb(0))
+    neglected = arb(0, 2 * norm**TERMS / arb.fac_ui(2 * TERMS))
     powers, fourth = [one, x, square, square * x], square * square
     out = []
     for odd in (0, 1):
@@ -30,7 +37,7 @@ def _cosh_sinh(x: arb_mat, one: arb_mat) -> tuple[arb_mat, arb_mat]:
             total = total * fourth
             for k in range(4):
                 total += powers[k] * (1 / arb.fac_ui(2 * (start + k) + odd))
-        out.append(total)
+        out.append(arb_mat([[v + neglected for v in row] for row in total.tolist()]))
     return out[0], out[1]
 
 
@@ -58,7 +65,34 @@ def scattering(a: arb_mat, b: arb_mat, half: arb, steepest: float) -> tuple[arb_
     return reflection, transmission
 
 
-def layer_emission(a: arb_mat, b: arb_mat, tau: arb, source: list[arb]) -> tuple[arb_mat, arb_mat]:
+def emitting(
+    a: arb_mat, b: arb_mat, tau: arb, steepest: float, source: list[arb]
+) -> tuple[arb_mat, arb_mat, arb_mat, arb_mat]:
+    """Reflection, transmission and what is emitted at the top and bottom of a layer.
+
+    The last two as of `_emission`, which is evaluated across a part of the layer that is thin
+    enough for its exponential, and doubled from there with reflection and transmission: the lower
+    half of two begins with the Planck function that the upper one ends with.
+    """
+    one = identity(a.nrows())
+    doublings = max(0, ceil(log2(float(tau) * steepest / EXPONENT)))
+    tau = tau / 2**doublings
+    reflection, transmission = scattering(a, b, tau / 2, steepest)
+    up, down = _emission(a, b, tau, source)
+    for _ in range(doublings):
+        lower = arb_mat([[1, tau], [0, 1]])
+        up_of_lower, down_of_lower = up * lower, down * lower
+        between = (one - reflection * reflection).inv()
+        risen = between * (up_of_lower + reflection * down)
+        fallen = between * (down + reflection * up_of_lower)
+        up, down = up + transmission * risen, down_of_lower + transmission * fallen
+        through = between * transmission
+        reflection += transmission * (reflection * through)
+        transmission, tau = transmission * through, 2 * tau
+    return reflection, transmission, up, down
+
+
+def _emission(a: arb_mat, b: arb_mat, tau: arb, source: list[arb]) -> tuple[arb_mat, arb_mat]:
     """What a layer sends up at its top and down at its bottom by emission.
 
     First column: if the Planck function B is 1; second: if it is the optical depth from the top.

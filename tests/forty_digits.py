@@ -4,22 +4,23 @@ It shares no code with the solver, and no algorithm: a layer's reflection and tr
 from the Taylor series of its matrix exponential and from doubling, layers are joined by adding,
 thermal emission enters the exponential as one more component. Matrices are dense over (nodes, sun,
 views), unscaled and not symmetric. Numbers are balls (`flint.arb`) that contain what rounding has
-done to them; a result whose ball is wider than 1e-40 of it is refused. So this decides which of two
-solvers is right where they differ.
+done to them; a result whose ball is wider than 1e-40 of it is refused, unless it is narrower than
+1e-60 of the sources: where nothing emits and nothing is lit the result is 0, of which no ball is a
+part. So this decides which of two solvers is right where they differ.
 """
 
 from collections.abc import Callable
-from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 from flint import arb, arb_mat, ctx
-from forty_digit_layers import EXPONENT, identity, layer_emission, scattering
+from forty_digit_layers import emitting, identity, scattering
 from forty_digit_nodes import gauss, leaning
 
 # 77 digits, of which exponentials, recursions and the pessimism of balls take 10 to 25.
 BITS = 256
 RADIUS = 1e-40
+NOTHING = 1e-60
 
 
 class Ground(NamedTuple):
@@ -128,22 +129,18 @@ def _mode(
             continue
         a, b = _matrices(layer, functions, m, directions, corrected)
         steepest = max(float(1 / min(cosines)), float(layer.secant))
-        # Exponentials across thin parts only, where light is emitted.
-        parts = 1 if emission is None else ceil(float(layer.tau) * steepest / EXPONENT)
-        tau = layer.tau / parts
-        reflection, transmission = scattering(a, b, tau / 2, steepest)
-        if emission is not None:
+        if emission is None:
+            reflection, transmission = scattering(a, b, layer.tau / 2, steepest)
+        else:
             source = [-2 * (1 - layer.ssa) / c for c in cosines]
             source[sun] = arb(0)
-            ups, downs = layer_emission(a, b, tau, source)
-        for part in reversed(range(parts)):
-            between = (one - below * reflection).inv()
-            if emission is not None:
-                top, bottom = layer.planck
-                slope = (bottom - top) / layer.tau
-                planck = arb_mat([[top + part * tau * slope], [slope]])
-                glow = ups * planck + transmission * (between * (glow + below * (downs * planck)))
-            below = reflection + transmission * (between * (below * transmission))
+            reflection, transmission, up, down = emitting(a, b, layer.tau, steepest, source)
+        between = (one - below * reflection).inv()
+        if emission is not None:
+            top, bottom = layer.planck
+            planck = arb_mat([[top], [(bottom - top) / layer.tau]])
+            glow = up * planck + transmission * (between * (glow + below * (down * planck)))
+        below = reflection + transmission * (between * (below * transmission))
     return below, glow
 
 
@@ -188,6 +185,16 @@ def _direct(
         brdf = ground.brdf(float(view), float(sun), float(azimuth))
         total += sun * arb(brdf) * (-passed).exp()
     return total
+
+
+def _known(found: arb, sources: float) -> float:
+    """The middle of a ball, which is 0 where the ball reaches it.
+
+    Raises ArithmeticError where the ball is too wide.
+    """
+    if not float(found.rad()) <= max(RADIUS * abs(float(found)), NOTHING * sources):
+        raise ArithmeticError(f"the result is only known as {found}.")
+    return 0.0 if found.contains(0) else float(found)
 
 
 def forty_digit_radiance(
@@ -256,10 +263,8 @@ def forty_digit_radiance(
                     thermal[v] = glow[row, 0] + arb(float(isotropic_top)) * fallen
         flux = arb(float(solar_irradiance)) / arb.pi()
         radiances = [flux * s + t for s, t in zip(solar, thermal, strict=True)]
-        for x in radiances:
-            if not float(x.rad()) <= RADIUS * abs(float(x)):
-                raise ArithmeticError(f"the result is only known as {x}.")
-        values = [float(x) for x in radiances]
+        sources = max(solar_irradiance, surface_emission, isotropic_top, *planck_levels)
+        values = [_known(x, float(sources)) for x in radiances]
         return np.array(values) if np.ndim(mu) else values[0]
     finally:
         ctx.prec = before
@@ -283,10 +288,7 @@ def forty_digit_albedo(tau, ssa, moments, albedo, mu0, num_streams):
         layers = [layer for layer, *_ in scaled]
         reflection, _ = _mode(layers, albedo, None, 0, directions, False)
         up = [w * x * reflection[i, len(pairs)] for i, (x, w) in enumerate(pairs)]
-        found = sum(up, arb(0)) / sun
-        if not float(found.rad()) <= RADIUS * abs(float(found)):
-            raise ArithmeticError(f"the result is only known as {found}.")
-        return float(found)
+        return _known(sum(up, arb(0)) / sun, 1.0)
     finally:
         ctx.prec = before
 

@@ -165,6 +165,30 @@ def test_the_judge_knows_a_cavity(level):
     np.testing.assert_allclose(radiance, 2, rtol=1e-15)
 
 
+def test_the_judge_joins_deep_layers_as_it_does_thin_ones():
+    """One layer, doubled within, and the thin ones that it is made of, joined from below."""
+    parts, scattered = 64, np.array([1.0, 0.7, 0.4, 0.2, 0.1])
+    levels = np.linspace(1.0, 3.0, parts + 1)  # whose steps are exact
+
+    def radiance(number):
+        each = 64.0 / number
+        return forty_digit_radiance(
+            *(np.full(number, each), np.full(number, 0.75), np.tile(scattered, (number, 1))),
+            *(0.25, 0.5, 0.75, 0.0, NUM_STREAMS, False),
+            planck_levels=levels[:: parts // number],
+            surface_emission=2.0,
+        )
+
+    assert radiance(1) == radiance(parts)
+
+
+def test_the_judge_knows_that_nothing_shines():
+    column = np.array([3.0]), np.array([1.0]), np.array([[1.0, 0.5, 0.3, 0.1, 0.05]])
+    warm = {"planck_levels": np.array([2.0, 2.0])}
+    assert forty_digit_radiance(*column, 1.0, 0.5, 0.7, 0.0, NUM_STREAMS, False, **warm) == 0
+    assert forty_digit_radiance(*column, 1.0, 0.5, 0.7, 0.0, NUM_STREAMS, False) == 0
+
+
 def test_the_judge_knows_a_grey_ground():
     """Under absorbing air the reflectance is albedo times the transmission of both paths."""
     tau, _, moments, _, mu0, mu, azimuth = (x[0] for x in columns())
