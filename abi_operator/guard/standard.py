@@ -1,5 +1,7 @@
 """The project's own columns: one of each kind that the operator is made for."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,7 +10,7 @@ from jaxtyping import Array
 from ..atmosphere import Atmosphere, Fire, Hydrometeor, LiquidCloud, MiePlume, Plume, State
 from ..bands import BANDS
 from ..geometry import Geometry
-from ..optics import ash, mie_plume, mie_species, smoke
+from ..optics import ash, background_aerosol, mie_plume, mie_species, smoke
 from ..standard_atmospheres import standard_atmosphere
 from ..surface import RossLi, ocean
 
@@ -31,6 +33,8 @@ _ALBEDO = {
 # cosine would be infinite.
 _OBLIQUE, _GLINT, _NADIR = (0.6, 0.8, 1.2), (0.5, 0.7, 2.9), (0.9, 0.0, 0.4)
 _LOW_SUN, _NIGHT = (1.3, 0.6, 0.5), (2.2, 0.5, 1.0)
+# Where paths through a sphere are begun to be taken, and nearly at the horizon.
+_RATHER_LOW_SUN, _VERY_LOW_SUN = (1.18, 0.4, 1.5), (1.45, 0.7, 2.0)
 # Bands over the sea and over grass where the ground is not Lambertian: none that emits.
 _SEA, _LAND = ("C01", "C02", "C04", "C06"), ("green", "C03", "C05")
 # Layer, and particles in a kilogram, of the classes beside ice, snow and rain.
@@ -50,8 +54,10 @@ def standard_columns() -> dict[str, State]:
     Most columns are of one structure: smoke, ash, one plume of every species that has a table of
     Mie theory but no published optics, droplets, ice, snow, rain, gases and a fire, with nothing
     of what is not in the column. So a derivative by what is absent is guarded as well, and they
-    are one batch. Grounds that are not Lambertian, Mie theory of droplets, smoke and ash, and other
-    classes of hydrometeors have columns of another. Leaves are float64 whatever JAX is set to.
+    are one batch. Grounds that are not Lambertian, Mie theory of smoke and ash, and other classes
+    of hydrometeors have columns of another; paths of the sun through a sphere, droplets by modified
+    anomalous diffraction, rough ice and background aerosol of a third. Leaves are float64 whatever
+    JAX is set to.
     """
     with jax.enable_x64(True):
         return _columns()
@@ -75,6 +81,9 @@ def _columns() -> dict[str, State]:
     columns["Mie droplets over sea and land"] = _on_rough_ground(_OBLIQUE, liquid=0.02)
     columns["Mie smoke and ash over sea and land"] = _on_rough_ground(_OBLIQUE, aod=0.4)
     columns["other hydrometeors over sea and land"] = _on_rough_ground(_GLINT, condensate=0.02)
+    columns["droplets by anomalous diffraction"] = _in_a_sphere(_RATHER_LOW_SUN, liquid=0.05)
+    columns["rough ice and snow"] = _in_a_sphere(_LOW_SUN, frozen=0.03)
+    columns["background aerosol"] = _in_a_sphere(_VERY_LOW_SUN, aod=0.15)
     return columns
 
 
@@ -152,6 +161,32 @@ def _on_rough_ground(
         air,
         {band: ocean(wind, band) for band in _SEA} | dict.fromkeys(_LAND, grass),
         _seen_under(angles),
+    )
+
+
+def _in_a_sphere(
+    angles: tuple[float, float, float],
+    *,
+    liquid: float = 0.0,
+    frozen: float = 0.0,
+    aod: float = 0.0,
+) -> State:
+    """Air of a winter under a low sun, with optics that are others by choice."""
+    bands = (*_SEA, *_LAND)
+    frozen_classes = {"ice": (_ICE_LAYER, frozen, 2e9), "snow": (_SNOW_LAYER, 2 * frozen, 1e6)}
+    air = standard_atmosphere(
+        "midlatitude_winter",
+        _HEIGHT,
+        liquid=LiquidCloud(*_in_layer(_STRATUS_LAYER, liquid, 7e11), "mitchell"),
+        hydrometeors={
+            name: Hydrometeor(*_in_layer(*particles), "rough")
+            for name, particles in frozen_classes.items()
+        },
+    )
+    return State(
+        replace(air, background=background_aerosol(aod, bands=bands)),
+        {band: jnp.asarray(_ALBEDO[band]) for band in bands},
+        replace(_seen_under(angles), spherical=True),
     )
 
 

@@ -34,7 +34,8 @@ SIZES |= {"sign of a derivative": 2.0, "float32": 1.0}
 # Those of one structure, with all the producers in it.
 STANDARD = guard.standard_columns()
 EVERY = {name for name, state in STANDARD.items() if state.fire is not None}
-ROUGH = set(STANDARD) - EVERY
+ROUGH = {name for name in STANDARD if "sea and land" in name}
+OTHERWISE = set(STANDARD) - EVERY - ROUGH
 FROZEN = "other hydrometeors over sea and land"
 # By day: in C02 there is nothing to see of the sun's light by night.
 DAY = EVERY - {"fire by night"}
@@ -218,6 +219,16 @@ def test_other_classes_and_mie_plumes_are_seen():
     assert {plume.species for plume in plumes.values()} == {"smoke", "ash"}
     for name, hydrometeor in columns[FROZEN].atmosphere.hydrometeors.items():
         assert np.sum(hydrometeor.mass_path) > 0, name
+
+
+def test_optics_that_are_others_by_choice_are_seen():
+    """What no other column has: a sphere, and by another theory droplets, ice and what is spread."""
+    for name in OTHERWISE:
+        state = STANDARD[name]
+        assert state.geometry.spherical, name
+        assert state.atmosphere.liquid.optics == "mitchell", name
+        assert {x.optics for x in state.atmosphere.hydrometeors.values()} == {"rough"}, name
+        assert state.atmosphere.background is not None, name
 
 
 @pytest.mark.slow
