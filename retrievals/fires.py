@@ -174,7 +174,7 @@ def retrieve_fires(
                 excess=background == "neighbours",
                 assumed=assumed_of_fire(bands) if assumed is None else assumed,
             )
-    about = how_made(dataset, bands, num_streams, noise, seed, prior) | {
+    about = how_made(dataset, bands, num_streams, noise, seed, prior, vector.names) | {
         "background": background,
         "detection_threshold": threshold,
     }

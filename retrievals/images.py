@@ -30,6 +30,7 @@ from .observation import (
 from .optimal_estimation import estimates
 from .pixels import retrieve_pixels
 from .prior import Prior
+from .prior_in_words import prior_in_words
 from .product import Field, diagnostic_fields, interval_fields, make_product, pixel_fields
 from .results import ResultCode
 from .smooth import Smoothness, retrieve_smooth, smoothness
@@ -154,7 +155,7 @@ def retrieve_image(
                 assumed=assumed,
                 smooth=None if smooth is None else smoothness(attempted, smooth),
             )
-    about = how_made(dataset, bands, num_streams, noise, seed, prior)
+    about = how_made(dataset, bands, num_streams, noise, seed, prior, vector.names)
     about |= {} if species is None else {"species": species}
     about |= {} if smooth is None else {"smooth_length_in_pixels": smooth}
     about |= attributes or {}
@@ -248,16 +249,20 @@ def how_made(
     num_streams: int,
     noise: bool,
     seed: int,
-    prior: object,
+    prior: Prior | StateVector | None,
+    names: tuple[str, ...],
 ) -> dict[str, Any]:
-    """Attributes of a product that tell how it was made, and of which measurements."""
+    """Attributes of a product that tell how it was made, and of which measurements.
+
+    `names` are those of the elements of x.
+    """
     own = str(dataset.attrs.get("noise", "none"))
     observed = {name: dataset.attrs[name] for name in _OBSERVED if name in dataset.attrs}
     return observed | {
         "bands": " ".join(bands),
         "num_streams": num_streams,
         "noise": f"added with seed {seed}" if noise else own,
-        "prior": "none" if prior is None else "normal distribution",
+        "prior": prior_in_words(prior, names),
     }
 
 

@@ -83,7 +83,7 @@ def test_a_prior_from_a_file_and_diagnostics(folder, run):
         np.testing.assert_allclose(parts, done["aod_550_sigma"], rtol=1e-2)
         assert (done["aod_550_error_due_to_albedo_C02"] > 0).all()
         assert (done["cost"] > 0).all() and (done["prior_cost"] > 0).all()
-        assert written.attrs["prior"] == "normal distribution"
+        assert written.attrs["prior"] == "normal distribution: aod_550 0.5 +/- 0.4"
 
 
 @pytest.mark.slow
@@ -93,7 +93,7 @@ def test_an_image_is_retrieved_as_a_whole(folder, run):
     assert answer.exit_code == 0, answer.output
     with xr.open_dataset(out) as written:
         assert written.attrs["smooth_length_in_pixels"] == 1.5
-        assert written.attrs["prior"] == "normal distribution"
+        assert written.attrs["prior"] == "normal distribution: aod_550 0.4, x +/- 1.5"
         assert np.isfinite(written["aod_550_sigma"]).all()
         assert (written["num_steps"] > 0).all()
     for options in (("--smooth", "0"), ("--smooth", "2", "--diagnostics")):
