@@ -222,7 +222,7 @@ def test_other_classes_and_mie_plumes_are_seen():
 
 
 def test_optics_that_are_others_by_choice_are_seen():
-    """What no other column has: a sphere, and by another theory droplets, ice and what is spread."""
+    """What no other column has: a sphere, and other theories of droplets, ice and aerosol."""
     for name in OTHERWISE:
         state = STANDARD[name]
         assert state.geometry.spherical, name
