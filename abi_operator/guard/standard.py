@@ -33,8 +33,8 @@ _ALBEDO = {
 # cosine would be infinite.
 _OBLIQUE, _GLINT, _NADIR = (0.6, 0.8, 1.2), (0.5, 0.7, 2.9), (0.9, 0.0, 0.4)
 _LOW_SUN, _NIGHT = (1.3, 0.6, 0.5), (2.2, 0.5, 1.0)
-# Where paths through a sphere are begun to be taken, and nearly at the horizon.
-_RATHER_LOW_SUN, _VERY_LOW_SUN = (1.18, 0.4, 1.5), (1.45, 0.7, 2.0)
+# Where paths through a sphere are begun to be taken, and at 11 degrees above the horizon.
+_RATHER_LOW_SUN, _VERY_LOW_SUN = (1.18, 0.4, 1.5), (1.38, 0.7, 2.0)
 # Bands over the sea and over grass where the ground is not Lambertian: none that emits.
 _SEA, _LAND = ("C01", "C02", "C04", "C06"), ("green", "C03", "C05")
 # Layer, and particles in a kilogram, of the classes beside ice, snow and rain.

@@ -129,7 +129,7 @@ def test_noise_is_not_added_twice_and_is_told(simulated, retrieval):
     noisy = simulated.assign_attrs(noise="of the instrument, seed 1", satellite="GOES-16")
     with pytest.raises(InputError, match="the result has noise .of the instrument, seed 1.; retr"):
         retrieve_smoke(noisy, noise=True)
-    told = how_made(noisy, ("C01",), 2, False, 0, None)
+    told = how_made(noisy, ("C01",), 2, False, 0, None, ("aod_550",))
     assert told["noise"] == "of the instrument, seed 1" and told["satellite"] == "GOES-16"
     assert retrieval.attrs["noise"] == "none"
 
