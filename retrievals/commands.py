@@ -19,9 +19,10 @@ from abi_operator.files import (
 )
 from abi_operator.radiance import FIRE_BANDS
 
+from . import retrieve_options as options
 from .fires import BACKGROUNDS
 from .images import REFLECTIVE
-from .kinds import KINDS, retrieve_kind, retrieve_smoke, vector_of
+from .kinds import retrieve_kind, retrieve_smoke, vector_of
 from .prior_file import DECLARED, read_prior
 from .product_file import read_retrieval
 from .scoring import format_report, score_retrieval
@@ -32,68 +33,19 @@ SCORES = "scores.csv"
 
 def retrieve(
     context: typer.Context,
-    kind: Annotated[str, typer.Argument(help=f"What to retrieve: {', '.join(KINDS)}.")],
-    result: Annotated[
-        Path,
-        typer.Argument(
-            help="result.nc of a simulation with such a plume, with cloud, or with C07 for fires."
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="File to write, NetCDF.")],
-    bands: Annotated[
-        str | None,
-        typer.Option(
-            help="Bands to retrieve from; C01,C02,C03 of plumes, C02,C06 of cloud and C05,C06,C07 "
-            "of fires."
-        ),
-    ] = None,
-    retrieve_ssa: Annotated[
-        bool,
-        typer.Option(
-            help="Retrieve how much the plume absorbs, too: its single-scattering albedo."
-        ),
-    ] = False,
-    effective_radius: Annotated[
-        bool,
-        typer.Option(
-            help="Retrieve the size of a plume's particles, too, by tables of Mie theory."
-        ),
-    ] = False,
-    noise: Annotated[bool, typer.Option(help="Add the imager's noise first.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
-    prior: Annotated[
-        str | None,
-        typer.Option(
-            help="What is known before: a TOML file with mean and sigma of [aod_550] and "
-            "others, or 'declared' for wide ones that are built in."
-        ),
-    ] = None,
-    diagnostics: Annotated[
-        bool,
-        typer.Option(help="Write averaging kernels, gains, errors by source and intervals, too."),
-    ] = False,
-    smooth: Annotated[
-        float | None,
-        typer.Option(
-            help="Retrieve the image as a whole: pixels up to about so many pixels apart are "
-            "alike. With the 'declared' prior unless --prior names one."
-        ),
-    ] = None,
-    where: Annotated[
-        str | None,
-        typer.Option(
-            help="'all' to retrieve every usable pixel and not only where there is a plume, or "
-            "where a fire stands out; without plume it needs a prior. Cloud is retrieved where the "
-            "result has cloud water, and nowhere else."
-        ),
-    ] = None,
-    background: Annotated[
-        str | None,
-        typer.Option(
-            help="How the ground beside a fire is known: 'stored' (the default), as the result "
-            "says, or 'neighbours', as the pixels around it show."
-        ),
-    ] = None,
+    kind: options.Kind,
+    result: options.Result,
+    out: options.Out,
+    bands: options.Bands = None,
+    retrieve_ssa: options.RetrieveSsa = False,
+    effective_radius: options.EffectiveRadius = False,
+    noise: options.Noise = False,
+    seed: options.Seed = 0,
+    prior: options.Prior = None,
+    diagnostics: options.Diagnostics = False,
+    smooth: options.Smooth = None,
+    where: options.Where = None,
+    background: options.Background = None,
 ) -> None:
     """Retrieve a plume, cloud or fires from a simulated result."""
     try:

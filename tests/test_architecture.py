@@ -13,7 +13,7 @@ FLOORS = [
     {"__main__"},
     {"cli"},
     {"observe_command", "simulate_command"},
-    {"guard", "sensitivity", "simulation"},
+    {"guard", "sensitivity", "simulate_options", "simulation"},
     {"commands", "demo", "drawing", "option_texts", "report", "request"},
     {"scene"},
     {"files", "instrument", "pictures", "products"},

@@ -2,7 +2,7 @@
 
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 import xarray as xr
@@ -11,74 +11,28 @@ from abi_operator.commands import one_sentence, typed
 from abi_operator.files import InputError, output_folder, read_result, reading
 
 from ..prior_file import read_prior
+from . import options
 from .observed import read_observed
-from .plume_numbers import NUMBERS
 from .report import csv_of, report_lines
 from .study import Errors, compared, numbers_of, tuned
 
 
 def tune(
     context: typer.Context,
-    result: Annotated[Path, typer.Argument(help="result.nc of a simulation, all of it.")],
-    observed: Annotated[
-        list[Path],
-        typer.Argument(
-            help="What was observed, NetCDF: a result (of observe), files of ABI (L1b or CMI, one "
-            "or several), or variables named C01, brf_C01 or, of MODIS, Band3 and so on, with "
-            "latitude and longitude."
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="Folder for what is found; made if need be.")],
-    fit: Annotated[
-        str | None,
-        typer.Option(
-            help=f"Numbers of the plume to be fitted, by commas: {', '.join(NUMBERS)}. Without, "
-            "scene and observation are compared as they are."
-        ),
-    ] = None,
-    species: Annotated[
-        str | None, typer.Option(help="Name of the plume, where the result has several.")
-    ] = None,
-    bands: Annotated[
-        str | None, typer.Option(help="Bands, by commas; all that both have without.")
-    ] = None,
-    nearest: Annotated[
-        float | None,
-        typer.Option(
-            metavar="KM",
-            help="Where grids differ, take the nearest observed pixel within so many km.",
-        ),
-    ] = None,
-    brf: Annotated[
-        bool,
-        typer.Option(
-            "--brf",
-            help="Observed numbers were divided by the cosine of the solar zenith angle, where "
-            "their names do not say; those of results and of ABI's files were not.",
-        ),
-    ] = False,
-    where: Annotated[
-        str, typer.Option(help="Pixels that decide: plume, or clear, those without cloud.")
-    ] = "plume",
-    calibration: Annotated[
-        bool,
-        typer.Option(
-            "--calibration",
-            help="Each band's gain is unknown, by the instrument's calibration error, and found.",
-        ),
-    ] = False,
-    forward_error: Annotated[
-        float, typer.Option(help="Relative error of the model in each pixel and band by itself.")
-    ] = 0.0,
-    prior: Annotated[
-        str,
-        typer.Option(help="TOML file with mean and sigma of [strength] and others, or 'declared'."),
-    ] = "declared",
-    time: Annotated[int, typer.Option(min=0, help="Which of the result's times, from 0.")] = 0,
-    plot: Annotated[
-        bool,
-        typer.Option("--plot", help="Draw maps and histograms; needs matplotlib."),
-    ] = False,
+    result: options.Result,
+    observed: options.Observed,
+    out: options.Out,
+    fit: options.Fit = None,
+    species: options.Species = None,
+    bands: options.Bands = None,
+    nearest: options.Nearest = None,
+    brf: options.Brf = False,
+    where: options.Where = "plume",
+    calibration: options.Calibration = False,
+    forward_error: options.ForwardError = 0.0,
+    prior: options.Prior = "declared",
+    time: options.Time = 0,
+    plot: options.Plot = False,
 ) -> None:
     """Compare a scene with what was observed of it, and tune its plume, as Grasso et al. did.
 
