@@ -135,9 +135,9 @@ def judged(task):
     return stress_truth.error(batch.columns, row, group[0], value)
 
 
-def beside_truth(rows, where, precision, count, most_streams=16, most_layers=200):
+def beside_truth(rows, where, precision, count, most_streams=16):
     """The worst columns against 40 digits."""
-    cheap = [k for k, g in enumerate(GROUPS) if g[0] <= most_streams and g[1] <= most_layers]
+    cheap = [k for k, g in enumerate(GROUPS) if g[0] <= most_streams]
     chosen = np.flatnonzero(np.isin(where[:, 0], cheap) & ~rows["beyond"])
     chosen = chosen[worst(rows[chosen], precision, count)]
     tasks = [(tuple(where[i].tolist()), float(rows["value"][i]), precision) for i in chosen]
@@ -149,11 +149,8 @@ def beside_truth(rows, where, precision, count, most_streams=16, most_layers=200
     with context.Pool(usable_cores(), one_core, (cores,)) as pool:
         errors = np.array(pool.map(judged, tasks, chunksize=1))
     known = errors[~np.isnan(errors)]
-    print(
-        f"The {chosen.size} worst columns of up to {most_streams} streams and {most_layers} ",
-        end="",
-    )
-    print(f"layers against 40 digits ({time.perf_counter() - started:.0f} s): ", end="")
+    print(f"The {chosen.size} worst columns of up to {most_streams} streams ", end="")
+    print(f"against 40 digits ({time.perf_counter() - started:.0f} s): ", end="")
     print(f"median {np.median(known):.1e}, worst {known.max():.1e}", end="")
     print(f" ({described(rows, where, chosen[np.nanargmax(errors)])}); ", end="")
     print(f"{np.isnan(errors).sum()} without a truth\n")

@@ -45,8 +45,9 @@ def by_stratum(rows, precision):
 def by_check(rows, where, precision):
     emits = np.array([group[3] for group in GROUPS])[where[:, 0]]
     for words, chosen in (("in sunlight alone", ~emits), ("that emit", emits)):
-        print(f"Errors by check, of columns {words}:\n")
-        _errors(rows[chosen], where[chosen], precision)
+        if chosen.any():
+            print(f"Errors by check, of columns {words}:\n")
+            _errors(rows[chosen], where[chosen], precision)
 
 
 def _errors(rows, where, precision):
