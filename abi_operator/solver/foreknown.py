@@ -34,7 +34,7 @@ def need(column: Column, options: Options, slopes: bool) -> Float[Array, "*batch
         albedo = jnp.full_like(column.mu0, _SOME_ALBEDO)
     mu = jnp.min(column.mu, axis=0)
     sun = jnp.broadcast_to(1 / column.mu0, tau.shape)
-    sums = depths(tau, 1 - ssa, ssa * (1 - moments[:, 1]), sun)
+    sums = depths(tau, 1 - ssa, ssa, ssa * (1 - moments[:, 1]), sun)
     ground = albedo * jnp.exp(-sums.slant - sums.tau / mu)
     nothing, cosines = jnp.zeros_like(mu)[None], jnp.stack([column.mu0, mu])
     known = expected(nothing, ground, sums, cosines)
@@ -52,7 +52,7 @@ def need(column: Column, options: Options, slopes: bool) -> Float[Array, "*batch
 def depths_of(layers: ScaledLayers, directions: Directions) -> Depths:
     """What the layers add up to."""
     backward = layers.ssa * (1 - layers.moments[:, 1])
-    return depths(layers.tau, layers.coalbedo, backward, directions.sun_secants)
+    return depths(layers.tau, layers.coalbedo, layers.ssa, backward, directions.sun_secants)
 
 
 def expected_of(

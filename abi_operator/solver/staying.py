@@ -53,7 +53,7 @@ class Parts(NamedTuple):
     border: Float[Array, "mode node beam *batch"]
     corner: Float[Array, "mode view *batch"]
     once: Float[Array, "3 *batch"]
-    depths: Float[Array, "5 *batch"]
+    depths: Float[Array, "6 *batch"]
 
     def below(self) -> Bordered:
         """What lies below, in every mode."""
@@ -65,7 +65,7 @@ def _shapes(num_streams: int, num_modes: int) -> list[tuple[int, ...]]:
     """Of the leaves of `Parts` of one column."""
     m, n = num_modes, num_streams // 2
     on_top = (m, n, n), (m, n, 2), (m, 2), (m, 1)
-    return [*on_top, (m, n, n), (m, n, 2), (m, 1), (3,), (5,)]
+    return [*on_top, (m, n, n), (m, n, 2), (m, 1), (3,), (6,)]
 
 
 def numbers_a_column(num_streams: int, num_modes: int) -> int:

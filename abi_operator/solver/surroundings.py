@@ -171,8 +171,8 @@ def _brf_between(tile: Column, options: Options) -> Float[Array, "view *batch"]:
     at_once = scattered + passed * (seen_at_once(problem) + through * below)
     known = problem.doublings
     if options.error_budget is not None:
-        tau, absorbed, backward, slant, peaked = kept.depths
-        around = Depths(tau, absorbed, backward, slant)
+        *around, peaked = kept.depths
+        around = Depths(*around)
         known = expected_between(tile, layers, directions, at_once, around, peaked)
     between = layers, directions, kept.below(), kept.above, tile.relative_azimuth
     return at_once + 0.5 * twice_reflected_between(*between, known, options)

@@ -139,7 +139,7 @@ def expected(
         Of the sun's zenith angle and of the views'. [-]
     """
     t = 0.75 * layers.backward
-    scattered = layers.tau - layers.absorbed
+    scattered = layers.scattered
     diffused = 0.5 * t / ((1 + t) * (1 + layers.absorbed))
     seen = added if ground is None else added + ground
     least = jnp.maximum(LEAST_BRF, jnp.min(seen, axis=0) + diffused)

@@ -19,8 +19,9 @@ class Depths(NamedTuple):
 
     Parameters
     ----------
-    tau, absorbed
-        Optical depth, and what of it absorbs. [-]
+    tau, absorbed, scattered
+        Optical depth, and what of it absorbs and scatters, each a sum of its own: under 1e5 that
+        absorb their difference does not see what little scatters, in single precision. [-]
     backward
         Of what scatters, times 1 - g. [-]
     slant
@@ -29,6 +30,7 @@ class Depths(NamedTuple):
 
     tau: Float[Array, "*batch"]
     absorbed: Float[Array, "*batch"]
+    scattered: Float[Array, "*batch"]
     backward: Float[Array, "*batch"]
     slant: Float[Array, "*batch"]
 
@@ -36,6 +38,7 @@ class Depths(NamedTuple):
 def depths(
     tau: Float[Array, "layer *batch"],
     coalbedo: Float[Array, "layer *batch"],
+    ssa: Float[Array, "layer *batch"],
     backward: Float[Array, "layer *batch"],
     sun_secants: Float[Array, "layer *batch"],
 ) -> Depths:
@@ -43,12 +46,12 @@ def depths(
 
     Parameters
     ----------
-    tau, coalbedo, backward
-        Layers' optical depth, 1 - ssa, and ssa (1 - g). [-]
+    tau, coalbedo, ssa, backward
+        Layers' optical depth, 1 - ssa, ssa, and ssa (1 - g). [-]
     sun_secants
         Of each layer's beam. [-]
     """
-    return Depths(*sums(tau, coalbedo, backward, sun_secants))
+    return Depths(*sums(tau, coalbedo, ssa, backward, sun_secants))
 
 
 def sums(

@@ -178,7 +178,7 @@ def known(
         heat = _Heat(*start, hottest=read(air.planck, jnp.asarray(count)))
     sums, heat = jax.lax.fori_loop(0, count, one, (sums, heat))
     return Known(
-        Depths(sums.tau, sums.absorbed, sums.backward, sums.slant),
+        Depths(sums.tau, sums.absorbed, sums.depth, sums.backward, sums.slant),
         Scattered((sums.depth, *sums.moments), sums.scattered_slant, (sums.once, sums.squared)),
         sums.source / (4 * mu * mu0),
         None if heat is None else _passing(heat),

@@ -186,11 +186,10 @@ def peaked_columns(layers: LayersOfModes) -> Float[Array, "*batch"]:
     num_streams = 2 * degrees.shape[1]
     last = degrees[:, -1] / (2 * num_streams - 1)
     peaks = jnp.maximum(-last, 0), jnp.maximum(last, 0)
-    tau, absorbed, backward, forward = sums(layers.tau, layers.coalbedo, *peaks)
-    scattered = tau - absorbed
+    _, scattered, backward, forward = sums(layers.tau, layers.moments[0][:, 0], *peaks)
     sharp = forward > budget.FORWARD / num_streams * scattered
     sharp = sharp | (num_streams > budget.FITTED_TO)
-    return jnp.where(backward > budget.BACKWARD * scattered, 2, sharp.astype(tau.dtype))
+    return jnp.where(backward > budget.BACKWARD * scattered, 2, sharp.astype(layers.tau.dtype))
 
 
 def _middle(layers: LayersOfModes) -> Float[Array, "layer *batch"] | None:

@@ -211,6 +211,19 @@ def test_single_precision():
     assert np.quantile(wrong, 0.99) < 1e-3
 
 
+@pytest.mark.float32
+def test_little_that_scatters_over_much_that_absorbs():
+    """Under black layers of 2e5 a difference of depths has no digit left of what scatters."""
+    given = {name: x.astype(np.float32) for name, x in columns().items()}
+    black = np.arange(LAYERS) >= LAYERS - 2
+    given["ssa"] = np.where(black, np.float32(0), given["ssa"])
+    given["tau"] = np.where(black, np.float32(1e5), np.float32(6e-4))
+    given["mu0"], given["mu"] = given["mu0"] * np.float32(0.2), given["mu"] * np.float32(0.2)
+    exact = np.asarray(toa_brf(**given, num_streams=STREAMS))
+    found = np.asarray(toa_brf(**given, num_streams=STREAMS, error_budget=1e-3))
+    np.testing.assert_allclose(found, exact, rtol=1e-3, atol=1e-5)
+
+
 @pytest.mark.parametrize("wrong", [0.0, 1.0, -1e-3, float("nan")])
 def test_budgets_that_are_none(wrong):
     with pytest.raises(ValueError, match="error_budget must be above 0"):
