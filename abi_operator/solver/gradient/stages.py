@@ -50,7 +50,8 @@ def _z_core(z_core, core, border, sent, left):
 
 @fenced
 def _y_core(h, y_core, once, z_core, more):
-    return 2 * y_core - 4 * h * symmetric(once) + h * _times_h(h, z_core, more)
+    # All of it, since what rounding leaves that is not symmetric would double each time.
+    return symmetric(2 * y_core - 4 * h * once + h * _times_h(h, z_core, more))
 
 
 def _times_h(h, over_h, more):
