@@ -19,6 +19,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
+from ..method.absorption import absorbed, emitting_half_layer, is_kept
 from ..method.adding import Emission, add_emitting_layer, add_layer, top
 from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
@@ -174,10 +175,12 @@ def _stacked(
         a, p = layer.matrices(light is not None, kernels, view_secant[None], how.single_scattering)
         own = jax.tree.map(lambda x: read(x, place), doublings)
         tau = as_deep_as_seen(layer.tau) if rounded and light is None else layer.tau
-        y, z = half_layer(a, p, tau, own)
         if light is None:
-            return add_layer(stack, y, z, tau), None
-        return add_emitting_layer(stack, light, y, z, tau, read(jumps, place) * (p @ one))
+            return add_layer(stack, *half_layer(a, p, tau, own), tau), None
+        ones = absorbed(layer.coalbedo, layer.secants(view_secant[None]), _num_nodes(lit))
+        y, z, ones = emitting_half_layer(a, p, tau, own, ones)
+        jump = read(jumps, place) * (p @ one)
+        return add_emitting_layer(stack, light, y, z, tau, jump, ones)
 
     put_on = one_kernel(put_on, _num_nodes(lit), in_parts=True)
 
@@ -198,7 +201,8 @@ def _stacked(
 def _of_ground(lit: Lit) -> Emission:
     """What the ground emits, with a place for the sun among the beams."""
     nodes, beams = lit.heating.ground.nodes, lit.heating.ground.beams
-    return Emission(Vector(nodes, jnp.concatenate([jnp.zeros_like(beams), beams])), None)
+    column = Vector(nodes, jnp.concatenate([jnp.zeros_like(beams), beams]))
+    return Emission(column, None, lit.ground @ _one(lit) if is_kept(nodes.dtype) else None)
 
 
 @partial(radiance.defjvp, symbolic_zeros=True)

@@ -23,12 +23,13 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, matmul
 from ...machine.kernels import one_kernel
+from ..method.absorption import absorbed, is_kept
 from ..method.adding import top
 from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
 from ..method.mode_layers import Layer, Layers, Order, added_to, read
 from .fields import Fields, pair
-from .layer import climb_warm, descend_warm
+from .layer import Absorption, climb_warm, descend_warm
 from .mode import Kernels
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 from .room import Keeper, Room
@@ -108,21 +109,27 @@ def slopes_of_mode(
         return function if num_layers == 1 else one_kernel(function, num_nodes, **how)
 
     def put_on_and_keep(below, air, jumps, doublings, number, order, kernels):
-        stack, column, room = below
+        stack, (column, ones), room = below
         layer, view_secant, own = _read(air, doublings, number, order)
         a, p = layer.matrices(order.mean, kernels, view_secant[None], single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
         warmth = None if column is None else Warmth(column, read(jumps, number))
-        stack, column, new, room = climb_warm(stack, warmth, a, p, layer.tau, own, room, keep)
-        return stack, column, keeper.with_layer(room, new, number)
+        absorption = None
+        if ones is not None:
+            of_layer = absorbed(layer.coalbedo, layer.secants(view_secant[None]), num_nodes)
+            absorption = Absorption(ones, of_layer, order.mean)
+        stack, light, new, room = climb_warm(
+            stack, warmth, absorption, a, p, layer.tau, own, room, keep
+        )
+        return stack, light, keeper.with_layer(room, new, number)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
 
     def up(below, number):
         return put_one(below, air, jumps, doublings, number, order, kernels), None
 
-    below = ground, column, room
-    (stack, column, room), _ = jax.lax.scan(up, below, numbers, reverse=True)
+    below = ground, (column, _absorbed_by(ground, column)), room
+    (stack, (column, _), room), _ = jax.lax.scan(up, below, numbers, reverse=True)
     answers, fields = at_the_top(stack, column)
 
     @compiled
@@ -156,6 +163,15 @@ def slopes_of_mode(
     (at_bottom, beams, slopes, of_jumps), _ = jax.lax.scan(down, above, numbers)
     of_ground, of_column = pair(1.0, [at_bottom]), _slope_of_column(at_bottom)
     return answers, fields, room, Slopes(slopes, beams, of_ground, of_column, of_jumps)
+
+
+def _absorbed_by(ground: Bordered, column: Vector | None) -> Vector | None:
+    """``Y 1`` of the ground, where that is kept."""
+    if column is None or not is_kept(ground.core.dtype):
+        return None
+    nodes = isotropic_nodes(ground.core)[:, 0]
+    nodes = jnp.broadcast_to(nodes, ground.border[:, 0].shape)
+    return ground @ Vector(nodes, jnp.ones_like(ground.diagonal))
 
 
 def _read(

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel, small_enough
+from ..method.absorption import absorbing, less, of_stack, through
 from ..method.bordered import Bordered, Vector, combined
 from ..method.doublings import Doublings, repeated
 from ..method.quotient import Quotient, minus_and_quotient
@@ -34,6 +35,24 @@ class Part(NamedTuple):
 
     core: Any
     border: Any
+
+
+class Absorption(NamedTuple):
+    """What is absorbed of isotropic light, where that is kept (`method.absorption`).
+
+    Parameters
+    ----------
+    stack
+        Y 1 of the stack below, at the nodes and at both beams.
+    layer
+        A 1 of the layer.
+    mean
+        Whether this is the azimuthal mean: 1 or 0.
+    """
+
+    stack: Vector
+    layer: Vector
+    mean: Float[Array, ""]
 
 
 class Kept(NamedTuple):
@@ -71,21 +90,25 @@ def climb(
 
     `keep` gives a room with a doubling in it, the number of which it is told.
     """
-    stack, _, kept, room = climb_warm(stack, None, a, p, tau, doublings, room, keep)
+    stack, _, kept, room = climb_warm(stack, None, None, a, p, tau, doublings, room, keep)
     return stack, kept, room
 
 
 def climb_warm(
     stack: Bordered,
     warmth: Warmth | None,
+    absorption: Absorption | None,
     a: Bordered,
     p: Bordered,
     tau: Float[Array, "*batch"],
     doublings: Doublings,
     room: Any,
     keep: Callable[[Any, Doubled, Any], Any],
-) -> tuple[Bordered, Vector | None, Kept, Any]:
-    """`climb` with thermal light (`thermal`), of which e of the stack is given back."""
+) -> tuple[Bordered, tuple[Vector | None, Vector | None], Kept, Any]:
+    """`climb` with thermal light (`thermal`), of which e of the stack is given back.
+
+    So is what the stack absorbs of isotropic light, where that is kept (`method.absorption`).
+    """
     number, step, start = doublings.of_layer()
     h = tau * step
     square = h * h
@@ -93,20 +116,29 @@ def climb_warm(
     fraction, inner = minus_and_quotient([(1 / 3, a)], square / 9, a, inner, a)
     z = combined([1.0, square], [p, fraction])
     # A Z^-1 C from the other side, whose quotient gives that by C by another (`undo_start`).
-    y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a)
+    of_ones = () if absorption is None else (absorption.layer.nodes[:, None],)
+    y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a, of_ones)
+    ones = None
+    if absorption is not None:
+        ones = absorption.layer
+        ones = h * (ones - square * through(fraction, z, by_a, ones))
+        y = absorbing(y, ones, absorption.mean)
 
     lag = None if warmth is None else start_of_lag(h, fraction)
 
     def double(k, carry):
-        y, z, lag, h, room = carry
+        y, z, lag, ones, h, room = carry
         z = combined([1.0, h], [z, y])
         lag = None if lag is None else doubled_lag(lag, y)
         right = feed(y)
         y, quotient = minus_and_quotient([(2.0, y)], 2 * h, y, z, y)
-        return y, z, lag, 2 * h, keep(room, Doubled(_part(quotient), right), k)
+        if absorption is not None:
+            ones = 2.0 * less(ones, h, quotient, ones)
+            y = absorbing(y, ones, absorption.mean)
+        return y, z, lag, ones, 2 * h, keep(room, Doubled(_part(quotient), right), k)
 
     if doublings.most:
-        y, z, lag, _, room = repeated(double, number, (y, z, lag, h, room))
+        y, z, lag, ones, _, room = repeated(double, number, (y, z, lag, ones, h, room))
     h = 0.5 * tau
     total = combined([1.0, 1.0], [stack, y])
     middle = combined([h, 0.5, 0.5 * h], [stack, z, y])
@@ -115,13 +147,16 @@ def climb_warm(
     base = [(1.0, total), (1.0, y)]
     stack, quotient = minus_and_quotient(base, h, total, middle, total, loads)
     stack = Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
+    if absorption is not None:
+        ones = of_stack(absorption.stack, ones, h, quotient)
+        stack = absorbing(stack, ones, absorption.mean)
     column, response = None, None
     if loaded is not None:
         column, response = respond(loaded, total, middle, h, quotient)
     part = _part(quotient)
     adding = Action(*part, quotient.ratio, quotient.over, feed(total), feed(middle))
     kept = Kept(p, feed(a), feed(fraction), _part(inner), _part(by_a), adding, response)
-    return stack, column, kept, room
+    return stack, (column, ones), kept, room
 
 
 def _part(quotient: Quotient) -> Part:

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import matmul, total
 from ...machine.elimination import inverse, solve
+from .absorption import absorbing, is_kept, of_stack
 from .bordered import Bordered, Vector, combined
 from .quotient import Quotient, minus_and_quotient, minus_quotient
 
@@ -32,10 +33,13 @@ class Emission(eqx.Module):
         What a black ground that emits radiance 1 under cold air gets back with s = 0 at the upper
         face: the downward irradiance over pi. Without meaning for other grounds; None where nobody
         asks for it.
+    absorbed
+        What the stack absorbs of isotropic light, where that is kept (`absorption`).
     """
 
     column: Vector
     returned: Float[Array, "*batch"] | None
+    absorbed: Vector | None = None
 
 
 def emitting_ground(
@@ -51,7 +55,8 @@ def emitting_ground(
     """
     reflected = ground @ one
     column = radiance * one + (radiance - 2 * planck) * reflected
-    return Emission(column, -jnp.ones_like(radiance))
+    kept = reflected if is_kept(radiance.dtype) else None
+    return Emission(column, -jnp.ones_like(radiance), kept)
 
 
 def add_layer(
@@ -86,11 +91,13 @@ def add_emitting_layer(
     impedance: Bordered,
     tau: Float[Array, "*batch"],
     jump: Vector | None,
+    absorbed: Vector | None,
 ) -> tuple[Bordered, Emission]:
     r"""Put a layer on a stack that emits.
 
     As `add_layer`, and :math:`e \leftarrow e - (Y + Y_e)S^{-1}(he - j)` with the layer's own
-    :math:`j = (B_{bottom} - B_{top}) B^{-1} 1`, None for air that does not emit.
+    :math:`j = (B_{bottom} - B_{top}) B^{-1} 1`, None for air that does not emit. `absorbed` is
+    :math:`Y_e 1` where that is kept.
     """
     h, both, middle = _sums(stack, admittance, impedance, tau)
     base = [(1.0, both), (1.0, admittance)]
@@ -99,11 +106,16 @@ def add_emitting_layer(
     if jump is not None:
         driving = driving - jump
     column = emission.column - quotient.transposed_action(driving)
+    added, kept = _with_own_beams(added), None
+    if absorbed is not None:
+        assert emission.absorbed is not None
+        kept = of_stack(emission.absorbed, absorbed, h, quotient)
+        added = absorbing(added, kept)
     if emission.returned is None:
-        return _with_own_beams(added), Emission(column, None)
+        return added, Emission(column, None, kept)
     solved = solve(middle.core, [emission.column.nodes[:, None]])[0].joined()[:, 0]
     returned = emission.returned + h * total(emission.column.nodes * solved)
-    return _with_own_beams(added), Emission(column, returned)
+    return added, Emission(column, returned, kept)
 
 
 def _sums(stack, admittance, impedance, tau):

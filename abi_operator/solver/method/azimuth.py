@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
+from .absorption import absorbed, emitting_half_layer
 from .adding import Emission, Top, add_emitting_layer, add_layer, top
 from .bordered import Bordered, Vector
 from .delta_m import ScaledLayers
@@ -119,10 +120,11 @@ def emitting_mean(
 
     def add(carry, x, kernels, directions, one):
         (stack, emission), (layer, planck_jump) = carry, x
-        of_mean = _half_layer_of_the_mean(layer, kernels, directions, single_scattering)
-        b_inverse, admittance, impedance = of_mean
+        a, b_inverse, ones = _mean_of_layer(layer, kernels, directions, single_scattering)
+        tau, doublings = layer[0], layer[-1]
+        admittance, impedance, ones = emitting_half_layer(a, b_inverse, tau, doublings, ones)
         jump = None if planck_jump is None else planck_jump * (b_inverse @ one)
-        return add_emitting_layer(stack, emission, admittance, impedance, layer[0], jump)
+        return add_emitting_layer(stack, emission, admittance, impedance, tau, jump, ones)
 
     xs = (_properties_of_the_mean(layers, directions, doublings), planck_jumps)
     shared = tables.kernels(0), directions, one
@@ -152,15 +154,16 @@ def _properties_of_the_mean(
     return (layers.tau, layers.coalbedo, directions.sun_secants, *moments, doublings)
 
 
-def _half_layer_of_the_mean(
+def _mean_of_layer(
     layer, kernels, directions, single_scattering
-) -> tuple[Bordered, Bordered, Bordered]:
-    tau, coalbedo, sun, moments_a, moments_b, doublings = layer
+) -> tuple[Bordered, Bordered, Vector]:
+    """A, the inverse of B, and A 1."""
+    _, coalbedo, sun, moments_a, moments_b, _ = layer
     secants = directions.secants(sun)
     a = layer_matrix(kernels[0], moments_a, secants, single_scattering)
     a = conservative(a, coalbedo)
     b_inverse = layer_matrix(kernels[1], moments_b, secants, single_scattering).inverse()
-    return b_inverse, *half_layer(a, b_inverse, tau, doublings)
+    return a, b_inverse, absorbed(coalbedo, secants, len(kernels[0].nodes))
 
 
 def higher_modes(

@@ -69,10 +69,10 @@ def test_slopes_are_those_of_the_whole_column():
 
 
 def test_what_is_kept_does_not_grow_with_layers():
-    """m (2 n^2 + 4 n + 4) numbers and eight more."""
+    """m (2 n^2 + 4 n + 4) numbers and nine more."""
     modes, nodes = STREAMS["num_streams"], STREAMS["num_streams"] // 2
     count = around(standard_columns()).numbers.shape[-1]
-    assert count == modes * (2 * nodes**2 + 4 * nodes + 4) + 8
+    assert count == modes * (2 * nodes**2 + 4 * nodes + 4) + 9
 
 
 def test_over_any_ground_under_a_sun_of_its_own_in_each_layer():
