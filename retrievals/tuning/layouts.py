@@ -50,12 +50,15 @@ class Found(NamedTuple):
         it was not; None where it says neither.
     source
         The variable, in words.
+    is_counts
+        Whether the values were rounded to the counts of ABI's files.
     """
 
     band: str
     values: np.ndarray
     is_brf: bool | None
     source: str
+    is_counts: bool = False
 
 
 class Grid(NamedTuple):
@@ -122,7 +125,7 @@ def _radiance_file(file: xr.Dataset, path: object) -> Found:
         _constant(file, name, path) for name in ("earth_sun_distance_anomaly_in_AU", "esun")
     )
     values = np.pi * distance**2 / irradiance * _plane(file, "Rad", path)
-    return Found(band, _of_quality(file, values, path), False, "Rad")
+    return Found(band, _of_quality(file, values, path), False, "Rad", is_counts=True)
 
 
 def _band_of_file(file: xr.Dataset, path: object) -> str:
@@ -146,9 +149,8 @@ def _named(file: xr.Dataset, path: object) -> list[Found]:
         band = _band_of_file(file, path)
         if _ABI_BAND.fullmatch(band.lower()):
             check_units(file["CMI"], "1", str(path))
-            found.append(
-                Found(band, _of_quality(file, _plane(file, "CMI", path), path), False, "CMI")
-            )
+            values = _of_quality(file, _plane(file, "CMI", path), path)
+            found.append(Found(band, values, False, "CMI", is_counts=True))
     for label in map(str, file.data_vars):
         match = _ABI_BAND.fullmatch(label.lower()) or _MODIS_BAND.fullmatch(label.lower())
         if match is None:
@@ -159,9 +161,10 @@ def _named(file: xr.Dataset, path: object) -> list[Found]:
             (MODIS[name], f"{label} of MODIS") if name in MODIS else (name.upper(), label)
         )
         is_brf, values = _IS_BRF.get(match["quantity"]), _plane(file, label, path)
-        if match["quantity"] == "cmi":  # a file of several bands has the flags of each
+        is_imagery = match["quantity"] == "cmi"
+        if is_imagery:  # a file of several bands has the flags of each
             values = _of_quality(file, values, path, f"DQF_{band}")
-        found.append(Found(band, values, is_brf, source))
+        found.append(Found(band, values, is_brf, source, is_counts=is_imagery))
     return found
 
 

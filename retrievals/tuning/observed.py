@@ -12,7 +12,7 @@ from abi_operator.files import InputError, read_result
 from abi_operator.files.netcdf import cf_attributes, open_netcdf
 
 from ..images import REFLECTIVE
-from ..observation import LARGEST_REFLECTANCE_FACTOR
+from ..observation import LARGEST_REFLECTANCE_FACTOR, imager_of
 from .fixed_grid import nearest_on_axis, scan_angles
 from .layouts import Found, Grid, found_in, is_result
 from .placing import placed
@@ -57,9 +57,10 @@ def read_observed(
     -------
     xarray.Dataset
         ``reflectance_factor`` (band, y, x), NaN where nothing was observed or it is above
-        `LARGEST_REFLECTANCE_FACTOR`, and ``saturated`` (1
-        where a band could tell no more); attributes ``observed_files``, ``observed_variables``,
-        ``regridding`` and, where the observation says so, ``observed_time``.
+        `LARGEST_REFLECTANCE_FACTOR`, ``saturated`` (1 where a band could tell no more) and
+        ``quantised`` (band), 1 where its values are counts, as those of ABI's own files are;
+        attributes ``observed_files``, ``observed_variables``, ``regridding`` and, where the
+        observation says so, ``observed_time``.
 
     Raises
     ------
@@ -104,6 +105,7 @@ def _read_one(
         {
             "reflectance_factor": (dims, values, about),
             "saturated": (dims, np.stack([x for _, x in fields.values()]).astype(np.int8)),
+            "quantised": ("band", np.array([one.is_counts for one in found], np.int8)),
         },
         {"band": bands},
     )
@@ -130,7 +132,8 @@ def _of_result(
         told = {"observed_time": str(result["time"].values.astype("datetime64[s]"))}
         if "error_budget" in result.attrs:
             told["error_budget"] = f"{float(result.attrs['error_budget']):g}"
-    names = [Found(band, x, False, band) for band, x in zip(bands, values, strict=True)]
+        counts = imager_of(result).quantised
+    names = [Found(band, x, False, band, counts) for band, x in zip(bands, values, strict=True)]
     return names, Grid(latitude, longitude), told
 
 

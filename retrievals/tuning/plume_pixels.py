@@ -1,6 +1,6 @@
 """The pixels of a plume that are looked at together, block by block so that few are in memory."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,8 @@ class PlumePixels:
         Bands that are looked at.
     measured
         Observed reflectance factors (pixel, band), NaN where there is none that counts. [-]
+    quantised
+        Which of the bands were observed as counts, so that rounding is part of their errors.
     """
 
     image: xr.Dataset
@@ -38,6 +40,7 @@ class PlumePixels:
     x: np.ndarray
     bands: tuple[str, ...]
     measured: np.ndarray
+    quantised: tuple[bool, ...]
 
     @property
     def counts(self) -> np.ndarray:
@@ -95,16 +98,33 @@ def plume_pixels(
         burns = image["fire_fraction"].values > 0
         shines = np.array([band in FIRE_BANDS for band in bands])
         values = np.where(shines[:, None, None] & burns, np.nan, values)
-    return PlumePixels(image, y, x, bands, values[:, y, x].T.astype(np.float64))
+    counts = [False] * len(bands)
+    if "quantised" in observed:
+        counts = [bool(one) for one in observed["quantised"].sel(band=list(bands)).values]
+    return PlumePixels(image, y, x, bands, values[:, y, x].T.astype(np.float64), tuple(counts))
 
 
 def error_of(
-    predicted: np.ndarray, bands: tuple[str, ...], imager: Imager, forward_error: float
+    predicted: np.ndarray,
+    bands: Sequence[str],
+    imagers: Sequence[Imager],
+    forward_error: float,
 ) -> np.ndarray:
     """Standard deviation of what is measured of a prediction (pixel, band). [-]
 
     The instrument's noise at the prediction, as that at the measurement would be small where noise
-    made the measurement small, and the forward model's own relative error.
+    made the measurement small, with what rounding to counts takes off, and the forward model's own
+    relative error.
+
+    Parameters
+    ----------
+    predicted
+        Reflectance factors (pixel, band). [-]
+    bands, imagers
+        Names of the bands, and the instrument as it observed each of them.
+    forward_error
+        Relative standard deviation of the forward model. [-]
     """
-    noise = [noise_sigma(predicted[:, i], band, imager) for i, band in enumerate(bands)]
+    each = zip(bands, imagers, strict=True)
+    noise = [noise_sigma(predicted[:, i], band, imager) for i, (band, imager) in enumerate(each)]
     return np.hypot(np.stack(noise, axis=-1), forward_error * predicted)

@@ -1,6 +1,7 @@
 """A scene beside what was observed of it, and its plume tuned to that."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal, NamedTuple
 
@@ -41,7 +42,7 @@ class Errors(NamedTuple):
 
 
 NOISE_ALONE = Errors()
-"""The model is exact, and the observation has the instrument's noise."""
+"""The model is exact, and the observation has the instrument's noise and, of counts, rounding."""
 
 
 def compared(
@@ -153,6 +154,7 @@ def tuned(
         "pixels_that_decide": where,
         "forward_error": errors.forward_error,
         "calibration": "unknown" if errors.calibration else "taken as exact",
+        "rounded_to_counts": " ".join(np.compress(pixels.quantised, bands)) or "none",
     }
     return joined(both, table, image, observed, about)
 
@@ -177,7 +179,9 @@ def numbers_of(
 def _problem(
     image: xr.Dataset, vector: StateVector, pixels: PlumePixels, errors: Errors
 ) -> Problem:
+    # The satellite is the scene's; whether counts were rounded only what was observed can say.
     imager = imager_of(image)
+    imagers = [replace(imager, quantised=counts) for counts in pixels.quantised]
     prior = vector.prior()
     gains = [
         float(imager.noise.calibration.get(band, 0.0)) if errors.calibration else 0.0
@@ -189,7 +193,7 @@ def _problem(
         np.asarray(prior.x_prior),
         np.sqrt(np.diag(np.asarray(prior.S_prior))),
         np.array(gains),
-        partial(error_of, bands=pixels.bands, imager=imager, forward_error=errors.forward_error),
+        partial(error_of, bands=pixels.bands, imagers=imagers, forward_error=errors.forward_error),
     )
 
 

@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray as xr
 
+from abi_operator.instrument import Imager, observe_mean, radiance_from_reflectance_factor
 from retrievals.observation import add_noise
 from retrievals.tuning import Errors, report_lines, tuned
 from retrievals.tuning.fit import _normal, image_of
@@ -102,6 +105,32 @@ def test_an_unknown_gain_is_found(image, true_image, observe_as):
     one = found.sel(stage="tuned", region="plume")
     assert (np.abs(one["bias"]) < 2e-3 * one["observed_mean"]).all()
     assert "with the fitted gains" in found["simulated"].attrs["long_name"]
+
+
+def test_counts_are_no_misfit(image, numbers, observe_as):
+    """Rounding adds about an eighth to the variance of a dark scene, and is in the errors."""
+    bands = ("C01", "C03")
+    counting = Imager(quantised=True)
+    truth = np.broadcast_to(0.05 + 0.001 * np.arange(8), (50, 3, 2, 8))
+    reports = [
+        observe_mean(
+            radiance_from_reflectance_factor(jnp.asarray(truth[:, :, i]), band),
+            band,
+            counting,
+            key=jax.random.key(i),
+        ).reflectance_factor
+        for i, band in enumerate(bands)
+    ]
+    seen = np.stack(reports, axis=-1).reshape(-1, 2)
+    observed = observe_as(image["reflectance_factor"])
+    everywhere = np.ones((3, 8), bool)
+    for counts, expected in ((np.array([1, 0, 1], np.int8), 1.0), (None, 1.13)):
+        one = observed if counts is None else observed.assign(quantised=("band", counts))
+        pixels = plume_pixels(image, one, everywhere, everywhere, bands)
+        error = _problem(image, numbers, pixels, NOISE_ALONE).error_of
+        predicted = np.moveaxis(truth, 2, -1).reshape(-1, 2)
+        chi_square = np.mean(((seen - predicted) / error(predicted)) ** 2)
+        assert abs(chi_square - expected) < 3 * np.sqrt(2 / seen.size) * expected
 
 
 def test_an_error_that_is_no_number_where_nothing_counts_is_none_of_the_others(problem):

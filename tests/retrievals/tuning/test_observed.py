@@ -164,6 +164,25 @@ def test_a_place_has_the_pixel_of_an_abi_file_that_it_is_seen_in(image, write):
     assert seen.attrs["observed_time"] == "2007-10-23T18:01:17"
 
 
+def test_files_of_abi_hold_counts_and_others_may_not(image, write, tmp_path):
+    """Rounding is part of what is not known of them, band by band."""
+    own = image["reflectance_factor"]
+    files = [
+        *write(named(image)[["C01", "latitude", "longitude"]], "C01.nc"),
+        *write(abi_file(image, "C02", own.sel(band="C02").values), "C02.nc"),
+    ]
+    assert read_observed(files, image)["quantised"].values.tolist() == [0, 1]
+    imagery = read_observed(write(named(image, "CMI_C0{}"), "CMI.nc"), image)
+    assert imagery["quantised"].values.tolist() == [1, 1, 1]
+    for counts in (0, 1):
+        path, times = tmp_path / f"{counts}.nc", np.atleast_1d(image["time"].values)
+        with ResultWriter(
+            path, times=times, shape=(3, 8), attributes={"quantised": counts}
+        ) as writer:
+            writer.write(0, slice(0, 3), image.drop_vars("time"))
+        assert (read_observed([path], image)["quantised"] == counts).all()
+
+
 def test_scan_angles_are_those_of_the_users_guide():
     """The example of its section 5.1.2.8.2, and a place that is out of sight."""
     projection = PROJECTION | {"semi_minor_axis": 6356752.31414}
