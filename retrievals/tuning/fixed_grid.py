@@ -79,8 +79,10 @@ def scan_angles(
     return np.where(in_sight, x, np.nan), np.where(in_sight, y, np.nan)
 
 
-def nearest_on_axis(axis: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def nearest_on_axis(axis: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Index of the pixel of an evenly spaced axis that holds an angle, -1 where none does.
+
+    Beside it how far the angle is from the pixel's centre. [rad]
 
     Parameters
     ----------
@@ -96,4 +98,5 @@ def nearest_on_axis(axis: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         raise InputError("the scan angles are not evenly spaced; give the file as it was written.")
     position = np.rint((wanted - axis[0]) / step)
     inside = (position >= 0) & (position < axis.size)
-    return np.where(inside, np.where(inside, position, 0), -1).astype(int)
+    apart = np.abs(wanted - (axis[0] + position * step))
+    return np.where(inside, np.where(inside, position, 0), -1).astype(int), apart

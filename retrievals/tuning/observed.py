@@ -15,7 +15,7 @@ from ..images import REFLECTIVE
 from ..observation import LARGEST_REFLECTANCE_FACTOR, imager_of
 from .fixed_grid import nearest_on_axis, scan_angles
 from .layouts import Found, Grid, found_in, is_result
-from .placing import placed
+from .placing import once_each, placed
 
 Quantity = Literal["reflectance_factor", "brf"]
 LARGEST_DELAY = np.timedelta64(30, "m")
@@ -47,7 +47,8 @@ def read_observed(
     nearest_km
         How far the nearest observed pixel may be from one of the scene, which takes its value; None
         where the grids have to be the same. Of a grid of scan angles a place on the ground has the
-        pixel that it is seen in, without this. [km]
+        pixel that it is seen in, without this. An observed pixel counts once: of several of the
+        scene that would have it the nearest does, and the others have none. [km]
     quantity
         What the numbers are where their names do not say (``C01``, ``reflectance_C01``, ``Band3``):
         ``"reflectance_factor"`` as in ABI files, or ``"brf"``, divided by the cosine of the solar
@@ -142,16 +143,29 @@ def _index(
 ) -> tuple[np.ndarray, str]:
     """Observed pixel, of all in a row, for each of the scene (y, x), -1 for none; and in words."""
     if grid.projection is None:
-        index = placed(grid.first, grid.second, image, nearest_km, path)
+        found, apart = placed(grid.first, grid.second, image, nearest_km, path)
         how = "none" if nearest_km is None else f"nearest pixel within {nearest_km:g} km"
-        return index, how
+    else:
+        found, apart = _seen_in(grid, grid.projection, image, path)
+        how = "pixel in which a place is seen"
+    index = once_each(found, apart)
+    left_out = np.count_nonzero(index != found)
+    if left_out:
+        how += f" ({left_out} pixels of the scene left out, as nearer ones have what they would)"
+    return index, how
+
+
+def _seen_in(
+    grid: Grid, projection: dict, image: xr.Dataset, path: object
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `placed`, of a grid of scan angles; distances are angles. [rad]"""
     latitude, longitude = (image[name].values.astype(float) for name in ("latitude", "longitude"))
-    x, y = scan_angles(latitude, longitude, grid.projection)
-    row, column = nearest_on_axis(grid.first, y), nearest_on_axis(grid.second, x)
+    x, y = scan_angles(latitude, longitude, projection)
+    (row, off_y), (column, off_x) = nearest_on_axis(grid.first, y), nearest_on_axis(grid.second, x)
     inside = (row >= 0) & (column >= 0)
     if not inside.any():
         raise InputError(f"{path} shows nothing of the scene; give one that covers it.")
-    return np.where(inside, row * grid.second.size + column, -1), "pixel in which a place is seen"
+    return np.where(inside, row * grid.second.size + column, -1), np.hypot(off_y, off_x)
 
 
 def _laid(

@@ -18,8 +18,10 @@ def placed(
     image: xr.Dataset,
     nearest_km: float | None,
     path: object,
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """Index of the observed pixel, of all in a row, for each pixel of a scene (y, x); -1 for none.
+
+    Beside it (y, x) how far that pixel is away, as a chord on a sphere of radius 1. [-]
 
     Parameters
     ----------
@@ -40,18 +42,41 @@ def placed(
     own = image["latitude"].values, image["longitude"].values
     if nearest_km is None:
         _check_same(latitude, longitude, own, path)
-        return np.arange(latitude.size).reshape(latitude.shape)
+        return np.arange(latitude.size).reshape(latitude.shape), np.zeros(latitude.shape)
     if not nearest_km > 0:
         raise InputError(f"the nearest pixel is some km away, above 0; got {nearest_km:g}.")
     fine = np.isfinite(latitude) & np.isfinite(longitude)
     if not fine.any():
         raise InputError(f"{path} has no finite latitude and longitude.")
     tree = scipy.spatial.KDTree(_unit(latitude[fine], longitude[fine]))
-    _, index = tree.query(_unit(*own), distance_upper_bound=_chord(nearest_km))
+    apart, index = tree.query(_unit(*own), distance_upper_bound=_chord(nearest_km))
     found = np.where(index < tree.n, np.flatnonzero(fine)[np.minimum(index, tree.n - 1)], -1)
     if not (found >= 0).any():
         raise InputError(f"no pixel of {path} is within {nearest_km:g} km of the scene.")
-    return found
+    return found, apart
+
+
+def once_each(index: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Indices of observed pixels (y, x) of which none is there twice; the others become -1.
+
+    What was observed once is one measurement with one error, however fine the scene is. Of the
+    scene's pixels that have the same observed one the nearest keeps it, and of several that are
+    as near the first.
+
+    Parameters
+    ----------
+    index
+        Observed pixel for each pixel of a scene (y, x), -1 for none.
+    apart
+        Distance between both, in any unit.
+    """
+    row = index.ravel()
+    nearest_first = np.argsort(apart.ravel(), kind="stable")
+    _, first = np.unique(row[nearest_first], return_index=True)
+    kept = np.full_like(row, -1)
+    chosen = nearest_first[first]
+    kept[chosen] = row[chosen]
+    return kept.reshape(index.shape)
 
 
 def spacing_km(latitude: np.ndarray, longitude: np.ndarray) -> float:

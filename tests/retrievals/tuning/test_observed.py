@@ -6,10 +6,10 @@ import xarray as xr
 
 from abi_operator.files import InputError
 from abi_operator.files.result import ResultWriter
-from retrievals.tuning import read_observed
+from retrievals.tuning import compared, read_observed, report_lines
 from retrievals.tuning.fixed_grid import nearest_on_axis, scan_angles
 from retrievals.tuning.observed import bands_in_common
-from retrievals.tuning.placing import spacing_km
+from retrievals.tuning.placing import once_each, spacing_km
 
 # Of GOES-16, as its files have it.
 PROJECTION = {
@@ -124,13 +124,12 @@ def test_the_nearest_pixel_is_taken_where_that_is_asked_for(image, write):
         read_observed(write(moved), image, nearest_km=1.0)
 
 
-def abi_file(image, band, values):
-    """An L1b file around the scene, packed as ABI's are, on a grid finer than the scene's."""
+def abi_file(image, band, values, step=28e-6):
+    """An L1b file around the scene, as ABI's are, on a grid finer than the scene's (4 km)."""
     x, y = scan_angles(image["latitude"].values, image["longitude"].values, PROJECTION)
-    step = 28e-6
     columns = np.arange(np.nanmin(x) - 5 * step, np.nanmax(x) + 5 * step, step)
     rows = np.arange(np.nanmax(y) + 5 * step, np.nanmin(y) - 5 * step, -step)
-    r, c = nearest_on_axis(rows, y), nearest_on_axis(columns, x)
+    (r, _), (c, _) = nearest_on_axis(rows, y), nearest_on_axis(columns, x)
     distance, esun = 0.995, 2017.18
     radiance = np.zeros((rows.size, columns.size))
     radiance[r, c] = values * esun / (np.pi * distance**2)
@@ -162,6 +161,29 @@ def test_a_place_has_the_pixel_of_an_abi_file_that_it_is_seen_in(image, write):
     assert np.isnan(difference[:, 0, 0]).all()  # of quality "no value"
     assert np.nanmax(difference) < 1e-12
     assert seen.attrs["observed_time"] == "2007-10-23T18:01:17"
+
+
+def test_an_observed_pixel_counts_once(image, write):
+    """A coarse observation of a fine scene is no more measurements than it has pixels."""
+    coarse = named(image).isel(lat=slice(1, None, 3), lon=slice(0, None, 4))
+    seen = read_observed(write(coarse), image, nearest_km=20.0)
+    values, own = (x["reflectance_factor"].values for x in (seen, image))
+    assert (np.isfinite(values).sum(axis=(1, 2)) == 2).all()
+    np.testing.assert_array_equal(values[:, 1, [0, 4]], own[:, 1, [0, 4]])  # the nearest have it
+    assert "(22 pixels of the scene left out, as nearer ones" in seen.attrs["regridding"]
+    lines = report_lines(compared(image, seen))
+    assert "(22 pixels of the scene left out, as nearer ones" in lines[0]
+    by_angles = abi_file(image, "C02", own[1], step=300e-6)
+    values = read_observed(write(by_angles, "abi.nc"), image)["reflectance_factor"].values[0]
+    there = values[np.isfinite(values)]
+    assert 1 < there.size == np.unique(there).size < 12
+
+
+def test_the_nearest_of_several_keeps_what_was_observed():
+    index = np.array([[3, 3, -1, 5], [3, 7, 7, -1]])
+    apart = np.array([[2.0, 1.0, np.inf, 9.0], [3.0, 4.0, 4.0, np.nan]])
+    expected = [[-1, 3, -1, 5], [-1, 7, -1, -1]]
+    np.testing.assert_array_equal(once_each(index, apart), expected)
 
 
 def test_files_of_abi_hold_counts_and_others_may_not(image, write, tmp_path):
