@@ -16,6 +16,7 @@ from ..observation import LARGEST_REFLECTANCE_FACTOR, imager_of
 from .fixed_grid import nearest_on_axis, scan_angles
 from .layouts import Found, Grid, found_in, is_result
 from .placing import once_each, placed
+from .satellite import check_satellite, longitude_of_file, longitude_of_result
 
 Quantity = Literal["reflectance_factor", "brf"]
 LARGEST_DELAY = np.timedelta64(30, "m")
@@ -66,8 +67,8 @@ def read_observed(
     Raises
     ------
     InputError
-        Where a file has no reflectances, other units (such as per cent), another grid or another
-        time than the scene, or nothing that is finite.
+        Where a file has no reflectances, other units (such as per cent), another grid, another time
+        or another satellite's place than the scene, or nothing that is finite.
     """
     if quantity not in ("reflectance_factor", "brf"):
         raise InputError(f"observed is 'reflectance_factor' or 'brf'; got {quantity!r}.")
@@ -94,6 +95,7 @@ def _read_one(
         if is_result(file):
             found, grid, told = _of_result(path, image)
         else:
+            check_satellite(longitude_of_file(file), image, path)
             found, grid = found_in(file, path)
             told = _times_of(file)
         index, how = _index(grid, image, nearest_km, path)
@@ -119,6 +121,7 @@ def _of_result(
 ) -> tuple[list[Found], Grid, dict[str, str]]:
     """Of a result the time that is nearest to the scene's."""
     with read_result(path) as result:
+        check_satellite(longitude_of_result(result.attrs), image, path)
         apart = np.abs(result["time"].values - np.asarray(image["time"].values))
         result = result.isel(time=int(np.argmin(apart)))
         bands = [str(b) for b in result["band"].values if str(b) in REFLECTIVE]

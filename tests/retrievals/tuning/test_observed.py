@@ -10,6 +10,7 @@ from retrievals.tuning import compared, read_observed, report_lines
 from retrievals.tuning.fixed_grid import nearest_on_axis, scan_angles
 from retrievals.tuning.observed import bands_in_common
 from retrievals.tuning.placing import once_each, spacing_km
+from retrievals.tuning.satellite import check_satellite
 
 # Of GOES-16, as its files have it.
 PROJECTION = {
@@ -161,6 +162,26 @@ def test_a_place_has_the_pixel_of_an_abi_file_that_it_is_seen_in(image, write):
     assert np.isnan(difference[:, 0, 0]).all()  # of quality "no value"
     assert np.nanmax(difference) < 1e-12
     assert seen.attrs["observed_time"] == "2007-10-23T18:01:17"
+
+
+def test_another_satellite_is_refused(image, write, tmp_path):
+    """Of which a file says by its grid where it stands, and a result by its attributes."""
+    east = image.assign_attrs(satellite="GOES-16", satellite_longitude=-75.2)
+    west = image.assign_attrs(satellite="GOES-18", satellite_longitude=-137.0)
+    own = image["reflectance_factor"].sel(band="C02").values
+    files = write(abi_file(image, "C02", own), "abi.nc")
+    assert np.isfinite(read_observed(files, east)["reflectance_factor"]).any()  # nominally at -75
+    with pytest.raises(InputError, match="at longitude -75 and .* GOES-18 at -137, under other"):
+        read_observed(files, west)
+    path, times = tmp_path / "west.nc", np.atleast_1d(image["time"].values)
+    with ResultWriter(path, times=times, shape=(3, 8), attributes=dict(west.attrs)) as writer:
+        writer.write(0, slice(0, 3), image.drop_vars("time"))
+    assert read_observed([path], west).sizes["band"] == 3
+    with pytest.raises(InputError, match="at longitude -137 and .* GOES-16 at -75.2, under"):
+        read_observed([path], east.drop_attrs(deep=False).assign_attrs(satellite="GOES-16"))
+    assert read_observed([path], image).sizes["band"] == 3  # a scene that does not say
+    # Both sides of the date line are near.
+    check_satellite(-179.8, image.assign_attrs(satellite_longitude=179.9), path)
 
 
 def test_an_observed_pixel_counts_once(image, write):
