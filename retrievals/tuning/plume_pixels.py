@@ -94,14 +94,19 @@ def plume_pixels(
     measured = observed["reflectance_factor"].sel(band=list(bands)).transpose("band", "y", "x")
     saturated = observed["saturated"].sel(band=list(bands)).transpose("band", "y", "x")
     values = np.where((saturated.values == 0) & counted, measured.values, np.nan)
-    if "fire_fraction" in image:
-        burns = image["fire_fraction"].values > 0
-        shines = np.array([band in FIRE_BANDS for band in bands])
-        values = np.where(shines[:, None, None] & burns, np.nan, values)
+    values = np.where(lit_by_fires(image, bands), np.nan, values)
     counts = [False] * len(bands)
     if "quantised" in observed:
         counts = [bool(one) for one in observed["quantised"].sel(band=list(bands)).values]
     return PlumePixels(image, y, x, bands, values[:, y, x].T.astype(np.float64), tuple(counts))
+
+
+def lit_by_fires(image: xr.Dataset, bands: Sequence[str]) -> np.ndarray:
+    """Where and in which bands a fire of the scene shines (band, y, x): no fit predicts that."""
+    shines = np.array([band in FIRE_BANDS for band in bands])[:, None, None]
+    if "fire_fraction" not in image:
+        return shines & np.zeros((image.sizes["y"], image.sizes["x"]), bool)
+    return shines & (image["fire_fraction"].values > 0)
 
 
 def error_of(

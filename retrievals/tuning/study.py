@@ -20,7 +20,7 @@ from .comparison import compare, regions_of
 from .fit import Problem, fit, ready
 from .observed import bands_in_common
 from .plume_numbers import plume_numbers
-from .plume_pixels import PlumePixels, error_of, plume_pixels
+from .plume_pixels import PlumePixels, error_of, lit_by_fires, plume_pixels
 from .product import fit_dataset, joined
 
 Where = Literal["plume", "clear"]
@@ -113,9 +113,10 @@ def tuned(
     -------
     xarray.Dataset
         As `compared` with the stage ``tuned`` as well (in the plume what the fit predicts to be
-        observed, which is times the fitted gains where the calibration is unknown; outside the
-        scene as it is), and what `product.fit_dataset` says of the
-        fit and of whether it explains the observation.
+        observed, which is times the fitted gains where the calibration is unknown, and NaN in bands
+        in which a fire shines there, so that both stages are compared without it; outside the scene
+        as it is), and what `product.fit_dataset` says of the fit and of whether it explains the
+        observation.
 
     Raises
     ------
@@ -141,6 +142,8 @@ def tuned(
         found = fit(problem)
         # As the residuals have it: what the gains explain is no bias any more.
         of_plume = (1 + problem.gains(found.z)) * found.normal.predicted
+        # Where a fire of the scene shines it is not part of what is predicted.
+        of_plume = np.where(lit_by_fires(image, bands)[:, pixels.y, pixels.x].T, np.nan, of_plume)
         maps = _factor(image, bands).copy(deep=True)
         maps.values[:, pixels.y, pixels.x] = of_plume.T
         table = fit_dataset(problem, found, _first_state(pixels))

@@ -133,6 +133,22 @@ def test_counts_are_no_misfit(image, numbers, observe_as):
         assert abs(chi_square - expected) < 3 * np.sqrt(2 / seen.size) * expected
 
 
+def test_where_a_fire_shines_no_plume_is_scored(image, true_image, observe_as, monkeypatch):
+    """Of what was observed there a fit has predicted no fire; bands without it count as ever."""
+    monkeypatch.setattr("retrievals.tuning.plume_pixels.FIRE_BANDS", ("C03",))
+    burns = ((image["x"] == 2) & (image["y"] == 1)).transpose("y", "x")
+    lit = true_image + xr.where((true_image["band"] == "C03") & burns, 0.6, 0.0)
+    scene = image.assign(
+        reflectance_factor=lit, fire_fraction=0.02 * burns, fire_temperature=900.0 + 0 * burns
+    )
+    found = tuned(scene, observe_as(lit), NUMBERS)
+    tuned_to = found.sel(stage="tuned", region="plume")
+    assert tuned_to["count"].values.tolist() == [24, 24, 23]
+    assert np.abs(found["difference"].sel(stage="tuned")).max() < 1e-3
+    lost = np.isnan(found["simulated"].sel(stage="tuned", band="C03"))
+    np.testing.assert_array_equal(lost, burns)
+
+
 def test_an_error_that_is_no_number_where_nothing_counts_is_none_of_the_others(problem):
     """As of a pixel that cannot be predicted, in which nothing was observed."""
     measured = problem.pixels.measured.copy()
