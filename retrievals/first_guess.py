@@ -22,7 +22,8 @@ def guesses(vector: StateVector, state: State | None = None) -> Float[Array, "gu
     """State vectors of the scan: all combinations of the quantities' own `starts`.
 
     Those of the first quantity vary slowest. What has none begins at the mean of its prior, or as
-    the state of the pixel holds it.
+    the state of the pixel holds it, kept inside its limits as the prior's mean is: at a limit x is
+    infinite, and no minimisation comes back from there.
     """
     starts = [quantity.starts or (quantity.mean,) for quantity in vector.quantities]
     columns = zip(vector.quantities, zip(*product(*starts), strict=True), strict=True)
@@ -31,7 +32,8 @@ def guesses(vector: StateVector, state: State | None = None) -> Float[Array, "gu
         if column[0] is not None:
             values.append(np.array(column))
         elif state is not None:
-            values.append(vector.held(state, quantity.name))
+            held = jnp.asarray(vector.held(state, quantity.name), float)
+            values.append(quantity.transform.inside(held))
         else:
             raise ValueError(f"{quantity.name} begins as a state holds it; give the state.")
     return vector.x(*values)

@@ -2,12 +2,16 @@
 
 from functools import partial
 
+import jax
 import numpy as np
+import pytest
 
+from retrievals import StateVector
 from retrievals.chunks import map_chunks
-from retrievals.declarations import SCANNED_AOD_550
+from retrievals.declarations import SCANNED_AOD_550, albedo, plume
 from retrievals.first_guess import candidates, guesses
 from retrievals.pixels import _scan_chunk  # the program of all retrievals
+from retrievals.quantities import with_part
 
 DARK = 0  # row of a scene
 
@@ -39,6 +43,19 @@ def test_further_starts_are_no_neighbours_while_there_are_others():
     np.testing.assert_array_equal(guess[0, :2], [1, 5])
     assert sorted(guess[0]) == list(range(6)) and not several.any()
     assert candidates(cost, (6, 1), 1)[0].shape == (1, 1)
+
+
+@pytest.mark.parametrize("limit", [0.0, 1.0])
+def test_what_a_state_holds_at_its_limit_begins_inside(columns, limit):
+    """As black water, or snow: x of a limit is infinite."""
+    _, states, _ = columns
+    one = jax.tree.map(lambda leaf: np.asarray(leaf)[0], states)
+    one = with_part(one, "albedo.C02", np.asarray(limit))
+    vector = StateVector((*plume("smoke").quantities, albedo("C02")))
+    found = np.asarray(guesses(vector, one))
+    assert np.isfinite(found).all()
+    batch = jax.tree.map(lambda leaf: np.asarray(leaf)[None], one)
+    np.testing.assert_array_equal(found[:, 1], vector.prior(batch).x_prior[0, 1])
 
 
 def test_the_scan_is_lowest_beside_the_truth(columns, forward):
