@@ -1,4 +1,4 @@
-"""Fires from the result of a simulation: temperature, burning share and emitted power.
+"""Fires from the result of a simulation: temperature, burning share and a black one's power.
 
 A fire shines in C05, C06 and C07, by day and by night, and is measured there as radiance: what a
 result calls so, sunlight and heat together. Pixels are attempted where they stand out of their
@@ -116,7 +116,8 @@ def retrieve_fires(
     -------
     xarray.Dataset
         As of `retrieve_image`, with ``fire_temperature``, ``fire_fraction``, ``fire_emitted_power``
-        and the ``fire_detection_score`` of every pixel.
+        (of a black fire, see `declarations.emitted_power`) and the ``fire_detection_score`` of
+        every pixel.
 
     Raises
     ------

@@ -48,7 +48,7 @@ def fire() -> StateVector:
     power = Derived(
         "fire_emitted_power",
         "W m-2",
-        "power that the fire emits per area of the pixel",
+        "power that a black fire of this temperature and share emits per area of the pixel",
         "fire",
         emitted_power,
     )
@@ -74,5 +74,9 @@ def assumed_of_fire(bands: Sequence[str]) -> StateVector:
 
 
 def emitted_power(fire: Fire) -> Float[Array, "*batch"]:
-    """Power of a black fire per area of the pixel, p sigma T^4, better known than both. [W m-2]"""
+    """Power of a black fire per area of the pixel, p sigma T^4, better known than both. [W m-2]
+
+    A fire emits 1 minus the ground's albedo of that in a band, and an albedo is known in the bands
+    alone: what a fire emits at all wavelengths is as much less as its mean emissivity is below 1.
+    """
     return STEFAN_BOLTZMANN * fire.fraction * fire.temperature**4

@@ -15,6 +15,7 @@ from abi_operator.scene import column_states, simulate
 from abi_operator.scene.angles import sun_distance
 from retrievals import ResultCode, retrieve_fires
 from retrievals.commands import retrieve
+from retrievals.declarations import fire
 from retrievals.fire_detection import DETECTED, surroundings
 from retrievals.fires import SCORE, with_fire
 from retrievals.images import retrieved_fields
@@ -121,6 +122,14 @@ def test_fires_are_found_and_retrieved_by_day_and_by_night(burning):
     ).sum() >= 4
     bounds = [of_fires(retrieval, f"fire_temperature_{bound}")[unsaturated] for bound in LEVELS]
     assert (np.diff([*bounds[:2], kelvin, *bounds[2:]], axis=0) > 0).all()
+
+
+def test_the_power_is_said_to_be_a_black_fires():
+    """Emissivity is known in the bands alone, and a power of all wavelengths is no band's."""
+    (power,) = fire().derived
+    burning = Fire(jnp.asarray(1e-2), jnp.asarray(800.0))
+    np.testing.assert_allclose(power.read(burning), 5.670374e-8 * 1e-2 * 800.0**4, rtol=1e-6)
+    assert "that a black fire" in power.long_name
 
 
 def test_neighbours_stand_for_the_ground(burning, monkeypatch):
