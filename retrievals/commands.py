@@ -40,7 +40,7 @@ def retrieve(
     retrieve_ssa: options.RetrieveSsa = False,
     effective_radius: options.EffectiveRadius = False,
     noise: options.Noise = False,
-    seed: options.Seed = 0,
+    seed: options.Seed = None,
     prior: options.Prior = None,
     diagnostics: options.Diagnostics = False,
     smooth: options.Smooth = None,
@@ -59,6 +59,8 @@ def retrieve(
             )
         )
         _check_background(kind, background)
+        if seed is not None and not noise:
+            raise ValueError("--seed is of the noise that --noise adds; give both, or neither.")
         prior = _smooth_prior(kind, smooth, diagnostics, prior)
         if where not in (None, "all"):
             raise ValueError(f"--where is 'all' or nothing; got {where!r}.")
@@ -76,7 +78,7 @@ def retrieve(
             retrieve_ssa=retrieve_ssa,
             effective_radius=effective_radius,
             noise=noise,
-            seed=seed,
+            seed=seed or 0,
             prior=None if prior is None else read_prior(prior, vector),
             diagnostics=diagnostics,
             **how,

@@ -34,7 +34,7 @@ EffectiveRadius = Annotated[
     typer.Option(help="Retrieve the size of a plume's particles, too, by tables of Mie theory."),
 ]
 Noise = Annotated[bool, typer.Option(help="Add the imager's noise first.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the noise.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the noise; 0 without.")]
 Prior = Annotated[
     str | None,
     typer.Option(

@@ -1,5 +1,6 @@
 """The command ``abi-operator tune``."""
 
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import xarray as xr
 from abi_operator.commands import one_sentence, typed
 from abi_operator.files import InputError, output_folder, read_result, reading
 
-from ..prior_file import read_prior
+from ..prior_file import DECLARED, read_prior
 from . import options
 from .observed import read_observed
 from .report import csv_of, report_lines
@@ -27,10 +28,10 @@ def tune(
     bands: options.Bands = None,
     nearest: options.Nearest = None,
     brf: options.Brf = False,
-    where: options.Where = "plume",
+    where: options.Where = None,
     calibration: options.Calibration = False,
-    forward_error: options.ForwardError = 0.0,
-    prior: options.Prior = "declared",
+    forward_error: options.ForwardError = None,
+    prior: options.Prior = None,
     time: options.Time = 0,
     plot: options.Plot = False,
 ) -> None:
@@ -45,6 +46,14 @@ def tune(
     abi-operator observe demo/result.nc --seed 1 --out demo/observed.nc
     abi-operator tune demo/result.nc demo/observed.nc --fit strength,ssa,height --out demo/tuning
     """
+    if fit is None:
+        of_fit = {
+            "--where": where,
+            "--calibration": calibration or None,
+            "--forward-error": forward_error,
+            "--prior": prior,
+        }
+        _check_unused(of_fit)
     pictures = _pictures() if plot else None
     with one_sentence(), reading(f"{result} or {', '.join(map(str, observed))}"):
         with read_result(result) as whole:
@@ -60,9 +69,10 @@ def tune(
                 found = compared(image, seen, **how)
             else:
                 numbers = _names(fit) or []
-                vector = read_prior(prior, numbers_of(image, numbers, species))
-                errors = Errors(calibration, forward_error)
-                how |= {"where": where, "errors": errors}
+                declared = numbers_of(image, numbers, species)
+                vector = read_prior(DECLARED if prior is None else prior, declared)
+                errors = Errors(calibration, forward_error or 0.0)
+                how |= {"where": where or "plume", "errors": errors}
                 found = tuned(image, seen, vector, **how)
             event = f"{found.attrs['history']}: {typed(context)}"
             found.attrs["history"] = "\n".join([event, str(whole.attrs["history"])])
@@ -73,6 +83,15 @@ def tune(
     typer.echo("\n".join(report_lines(found)))
     for name in ("tuning.nc", "tuning.csv", *(path.name for path in drawn)):
         typer.echo(f"wrote {out / name}")
+
+
+def _check_unused(options: Mapping[str, object]) -> None:
+    """Refuse options of a fit, by name, of which one was given where nothing is fitted."""
+    with one_sentence():
+        given = [name for name, value in options.items() if value is not None]
+        if given:
+            are = "is" if len(given) == 1 else "are"
+            raise InputError(f"{', '.join(given)} {are} of a fit; say what to fit with --fit.")
 
 
 def one_time(result: xr.Dataset, time: int) -> xr.Dataset:

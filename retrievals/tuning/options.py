@@ -47,21 +47,32 @@ Brf = Annotated[
     ),
 ]
 Where = Annotated[
-    str, typer.Option(help="Pixels that decide: plume, or clear, those without cloud.")
+    str | None,
+    typer.Option(
+        help="Pixels that decide a fit: plume, all of it (the default), or clear, those without "
+        "cloud."
+    ),
 ]
 Calibration = Annotated[
     bool,
     typer.Option(
         "--calibration",
-        help="Each band's gain is unknown, by the instrument's calibration error, and found.",
+        help="Each band's gain is unknown to a fit, by the instrument's calibration error, and "
+        "found.",
     ),
 ]
 ForwardError = Annotated[
-    float, typer.Option(help="Relative error of the model in each pixel and band by itself.")
+    float | None,
+    typer.Option(
+        help="Relative error of the fitted model in each pixel and band by itself; 0 without."
+    ),
 ]
 Prior = Annotated[
-    str,
-    typer.Option(help="TOML file with mean and sigma of [strength] and others, or 'declared'."),
+    str | None,
+    typer.Option(
+        help="TOML file with mean and sigma of [strength] and others to be fitted, or 'declared' "
+        "(the default)."
+    ),
 ]
 Time = Annotated[int, typer.Option(min=0, help="Which of the result's times, from 0.")]
 Plot = Annotated[

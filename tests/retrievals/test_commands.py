@@ -145,6 +145,8 @@ def test_trouble_is_one_sentence(folder, run):
         "retrieve", "smoke", folder / "result.nc", "--out", folder / "x.nc", "--bands", "C99"
     )
     assert answer.exit_code == 2 and "C99" in answer.stderr
+    answer = run("retrieve", "smoke", folder / "result.nc", "--out", folder / "x.nc", "--seed", "3")
+    assert answer.exit_code == 2 and "--seed is of the noise that --noise adds" in answer.stderr
     answer = run("retrieve", "fog", folder / "result.nc", "--out", folder / "x.nc")
     assert answer.exit_code == 2 and "smoke, ash, dust, cloud" in answer.stderr
     answer = run("score", folder / "result.nc", folder / "result.nc")
