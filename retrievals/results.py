@@ -6,7 +6,11 @@ import numpy as np
 
 
 class ResultCode(enum.IntEnum):
-    """Result of a retrieval at one pixel; only ``SUCCESS`` vouches for the value."""
+    """Result of a retrieval at one pixel; only ``SUCCESS`` vouches for the value.
+
+    It vouches for no small error but that of a plume's optical depth: other quantities are as well
+    known as their posterior standard deviations say.
+    """
 
     SUCCESS = 0
     NO_PLUME = 1
@@ -56,8 +60,8 @@ _MESSAGES = {
     ),
     ResultCode.NOT_OBSERVABLE: (
         "The measurements hardly depend on what is retrieved (ground or cloud near critical "
-        "albedo, or a very thick plume): the posterior error exceeds the expected error; add a "
-        "band or a prior."
+        "albedo, or a very thick plume): the posterior error of optical depth exceeds the expected "
+        "error, or that of something else is infinite; add a band or a prior."
     ),
     ResultCode.TOO_FEW_BANDS: (
         "Not attempted: fewer bands have values here, neither missing nor saturated, than there "

@@ -4,7 +4,7 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from retrievals.declarations import plume
+from retrievals.declarations import fire, liquid_cloud, plume
 from retrievals.diagnostics import probability_of_cost
 from retrievals.inverse import Inversion
 from retrievals.quality import EXACT_COST, result_codes, sigmas
@@ -51,6 +51,32 @@ def test_the_error_of_optical_depth_is_propagated():
 )
 def test_a_minimum_without_rival(best, expected):
     assert code(best) == expected
+
+
+def test_of_errors_only_that_of_optical_depth_has_a_limit():
+    """Which the message says; another quantity may have any error that is finite."""
+    vectors = (plume("ash", effective_radius=True), fire(), liquid_cloud())
+    limited = {q.name for v in vectors for q in v.quantities if q.largest_error is not None}
+    assert limited == {"aod_550"}
+    message = ResultCode.NOT_OBSERVABLE.message
+    assert "of optical depth exceeds" in message and "something else is infinite" in message
+    x = np.asarray(fire().x(np.array([800.0]), np.array([1e-3])))
+    ones = np.ones(1)
+    for variance, expected in (
+        (1e4, ResultCode.SUCCESS),
+        (np.inf, ResultCode.NOT_OBSERVABLE),
+    ):
+        found = Inversion(
+            x=x,
+            covariance=np.diag([variance, 1.0])[None],
+            averaging_kernel=np.eye(2)[None],
+            measurement_cost=0 * ones,
+            prior_cost=0 * ones,
+            num_steps=ones,
+            converged=ones == 1,
+        )
+        codes = result_codes(fire(), found, found, np.array([3]), exact=False)
+        assert codes[0] == expected
 
 
 def test_slopes_that_are_no_number_are_no_lack_of_steps():
