@@ -171,7 +171,28 @@ def draw_independent_truth(table: xr.Dataset, figure: "Figure") -> None:
             panel.set(xlabel=f"true {quantity}", ylabel="retrieved")
             panel.set_title(f"{case}: bias {float(one['bias']):.3f}")
             ratio = np.abs(retrieved - truth) / sigma
-            row[-1].plot(probability, [np.nanmean(ratio <= w) for w in widths], label=case)
+            row[-1].plot(probability, share_within(ratio, widths), label=case)
         row[-1].set(xlabel="probability of the interval", ylabel="share of truths inside")
         row[-1].set_title(quantity)
         row[-1].legend()
+
+
+def share_within(ratio: np.ndarray, widths: np.ndarray) -> np.ndarray:
+    """Share of errors up to each width, of those that are numbers, as the scores count them.
+
+    Parameters
+    ----------
+    ratio
+        Errors over their standard deviations, NaN where a retrieval did not converge. [-]
+    widths
+        In standard deviations. [-]
+
+    Returns
+    -------
+    numpy.ndarray
+        For each width; NaN without any number. [-]
+    """
+    known = ratio[np.isfinite(ratio)]
+    if known.size == 0:
+        return np.full(widths.shape, np.nan)
+    return np.mean(known[:, None] <= widths, axis=0)

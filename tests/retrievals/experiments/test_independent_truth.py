@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+import xarray as xr
+from matplotlib.figure import Figure
 
-from retrievals.experiments import independent_truth
+from retrievals.experiments import draw_independent_truth, independent_truth
 from retrievals.experiments.independent_case import STRIPS, uneven
 from retrievals.experiments.independent_clouds import independent_cloud
 from retrievals.experiments.independent_fires import independent_fire
 from retrievals.experiments.independent_plumes import RADII_UM, independent_plume
+from retrievals.experiments.independent_truth import share_within
 
 
 @pytest.mark.slow
@@ -19,6 +22,27 @@ def test_a_covariance_of_the_forward_model_widens_the_error_bars():
     sigma = table["sigma"]
     assert (sigma.isel(S_obs=1) > sigma.isel(S_obs=0)).mean() > 0.9
     assert ((table["forward_error"] > 0.005) & (table["forward_error"] < 0.3)).all()
+
+
+def test_what_did_not_converge_is_drawn_neither_inside_nor_outside():
+    """As in the table's coverage: three of the four that did are within 1 and all within 3."""
+    ratio = np.array([0.5, np.nan, 0.9, 2.0, np.nan, 0.1])
+    np.testing.assert_array_equal(share_within(ratio, np.array([1.0, 3.0])), [0.75, 1.0])
+    assert np.isnan(share_within(np.full(3, np.nan), np.ones(2))).all()
+    dims = ("quantity", "S_obs")
+    table = xr.Dataset(
+        {
+            "truth": (("quantity", "pixel"), np.zeros((1, 6))),
+            "retrieved": ((*dims, "pixel"), ratio[None, None]),
+            "sigma": ((*dims, "pixel"), np.ones((1, 1, 6))),
+            "bias": (dims, [[0.0]]),
+        },
+        {"quantity": ["smoke"], "S_obs": ["noise"]},
+    )
+    figure = Figure()
+    draw_independent_truth(table, figure)
+    shares = figure.axes[-1].lines[-1].get_ydata()
+    assert set(np.unique(shares)) <= {0.0, 0.25, 0.5, 0.75, 1.0} and shares[-1] == 1.0
 
 
 def test_factors_of_strips_have_a_mean_of_one():
