@@ -170,7 +170,7 @@ def retrieve_fires(
                 states,
                 prior=prior,
                 minimiser=minimiser,
-                exact=exact and solved_whole(dataset),
+                exact=exact and solved_whole(dataset, num_streams),
                 diagnostics=diagnostics,
                 excess=background == "neighbours",
                 assumed=assumed_of_fire(bands) if assumed is None else assumed,

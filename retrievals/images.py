@@ -94,7 +94,8 @@ def retrieve_image(
     diagnostics
         Whether to add matrices and errors of `optimal_estimation` to the product.
     num_streams
-        Streams of the solver; None for those of the simulation.
+        Streams of the solver; None for those of the simulation. With others no fit is exact, and
+        each is judged by the noise.
     minimiser
         How, and when to end.
     smooth
@@ -150,7 +151,7 @@ def retrieve_image(
                 states,
                 prior=prior,
                 minimiser=minimiser,
-                exact=not noise and prior is None and solved_whole(dataset),
+                exact=not noise and prior is None and solved_whole(dataset, num_streams),
                 diagnostics=diagnostics,
                 assumed=assumed,
                 smooth=None if smooth is None else smoothness(attempted, smooth),
@@ -227,10 +228,20 @@ def forward_model(
     )
 
 
-def solved_whole(dataset: xr.Dataset) -> bool:
+def solved_whole(dataset: xr.Dataset, num_streams: int | None = None) -> bool:
     """Whether a result has no error, of its making or its observation, so that a fit could be
     exact; not where columns have streams of their own, of which a retrieval has the most for all.
+
+    Parameters
+    ----------
+    dataset
+        The result.
+    num_streams
+        Streams of the model that is fitted: unless they are the result's no fit is exact. None for
+        those of the result.
     """
+    if num_streams not in (None, streams_of_attributes(dataset.attrs)):
+        return False
     made_with_errors = {"error_budget", "streams_error"} & set(dataset.attrs)
     return not made_with_errors and not has_noise(dataset) and not imager_of(dataset).quantised
 

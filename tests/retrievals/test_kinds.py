@@ -89,6 +89,18 @@ def test_times_and_refusals_keep_their_places(simulated):
     assert errors(both, retrieval).max() < RECOVERED
 
 
+def test_a_result_of_other_streams_is_fitted_within_its_noise(simulated):
+    """Of the solver's own error an exact fit would find a poor one in every pixel."""
+    off = 1 + 1e-3 * np.array([1, -1, 1])[:, None, None]
+    other = simulated.assign(reflectance_factor=simulated["reflectance_factor"] * off)
+    poor = retrieve_smoke(other)["result_code"]
+    assert (poor[[DARK, BRIGHT]] == ResultCode.POOR_FIT).all()
+    found = retrieve_smoke(other.assign_attrs(num_streams=4), num_streams=2)
+    assert found.attrs["num_streams"] == 2
+    assert not (found["result_code"] == ResultCode.POOR_FIT).any()
+    assert (found["result_code"][DARK] == ResultCode.SUCCESS).sum() >= 3
+
+
 def test_of_fires_a_scene_reflects_nothing(simulated, retrieval):
     """A result with fires elsewhere is that of sunlight, as it was simulated: without their heat,
     and the ground's."""
