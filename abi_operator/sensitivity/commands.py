@@ -88,8 +88,9 @@ def sensitivity(
     of: Annotated[
         str,
         typer.Option(
-            help="What is looked at, by commas: bands (brf), green (derived; green:bah2018 and so "
-            "on; green_band is simulated), fire_contrast."
+            help="What is looked at, by commas: bands (brf; C05 and C06 with the light of the "
+            "scene's fires, or beside fire_contrast with that of --fire), green (derived; "
+            "green:bah2018 and so on; green_band is simulated), fire_contrast."
         ),
     ],
     to: Annotated[

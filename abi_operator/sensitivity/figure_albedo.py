@@ -98,16 +98,19 @@ def albedo_figure(image: xr.Dataset, fire: Fire) -> Figure:
 
 
 def _contrasts(states: State, species: str, how: tuple) -> np.ndarray:
-    """Contrast (column, of) of the plume in each band, and of the fire under it."""
+    """Contrast (column, of) of the plume in each band, without the fire, and of the fire under it.
+
+    In C06 light of the fire would drown the plume's.
+    """
     plume = states.atmosphere.plumes[species]
     assert isinstance(plume, Plume)
     none = replace(plume, brightness=jnp.zeros_like(plume.brightness))
     plumes = {**states.atmosphere.plumes, species: none}
     clear = replace(states, atmosphere=replace(states.atmosphere, plumes=plumes))
-    seen = output_function((*_BANDS, _FIRE), *how)
-    with_plume, without = np.asarray(seen(states)), np.asarray(seen(clear))
-    contrast = with_plume / without - 1
-    return np.concatenate([contrast[:, :-1], with_plume[:, -1:]], axis=-1)
+    seen = output_function(_BANDS, *how)
+    with_plume, without = (np.asarray(seen(replace(x, fire=None))) for x in (states, clear))
+    of_fire = np.asarray(output_function((_FIRE,), *how)(states))
+    return np.concatenate([with_plume / without - 1, of_fire], axis=-1)
 
 
 def _line(what: str, name: str, values: np.ndarray) -> str:

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from ..atmosphere import Fire, State
 from ..bands import BANDS
 from ..products import GREEN_RECIPES, derived_green, fire_contrast
-from ..radiance import THERMAL, radiance
+from ..radiance import FIRE_BANDS, THERMAL, of_white_ground, radiance, sunlight
 from ..reflectance import brf
 from ..settings import Settings
 from .derivatives import Function
@@ -23,9 +23,10 @@ _SOLAR = tuple(band for band in BANDS if band not in THERMAL)
 def check_outputs(names: Sequence[str]) -> tuple[str, ...]:
     """Return names of outputs as a tuple, or raise `ValueError` for what is none.
 
-    Bands are bidirectional reflectance factors; ``green`` is derived by Eq. (1) of Grasso et al.
-    (2013), ``green:bah2018`` by another recipe; light of 0.555 um itself is ``green_band``. The
-    contrast of a fire is that in C06, as `products.fire_contrast` has it.
+    Bands are bidirectional reflectance factors, C05 and C06 with what shines there of states with a
+    fire; ``green`` is derived by Eq. (1) of Grasso et al. (2013), ``green:bah2018`` by another
+    recipe; light of 0.555 um itself is ``green_band``. The contrast of a fire is that in C06, as
+    `products.fire_contrast` has it.
     """
     for name in names:
         if name != FIRE_CONTRAST and name not in _PLAIN and _recipe(name) is None:
@@ -61,17 +62,26 @@ def output_function(
     settings
         How to simulate.
     sun_distance
-        For the contrast of a fire. [AU]
+        For what shines beside the sun. [AU]
+
+    Raises
+    ------
+    ValueError
+        As `check_outputs`; by the function where there is no fire whose contrast to look at, or no
+        temperature of what shines (`radiance`).
     """
     names = check_outputs(names)
     bands = bands_of([name for name in names if name != FIRE_CONTRAST])
 
     def outputs(states: State) -> Float[Array, "column of"]:
+        shining = [band for band in bands if states.fire is not None and band in FIRE_BANDS]
+        dark = tuple(band for band in bands if band not in shining)
         found: dict[str, Array] = {}
-        if bands:
-            without = replace(states, fire=None)
-            seen = brf(without, bands, **settings._asdict())
-            found = {band: seen[..., k] for k, band in enumerate(bands)}
+        if dark:
+            seen = brf(replace(states, fire=None), dark, **settings._asdict())
+            found = {band: seen[..., k] for k, band in enumerate(dark)}
+        if shining:
+            found |= _brf_with_emission(states, tuple(shining), settings, sun_distance)
         columns = []
         for name in names:
             if name == FIRE_CONTRAST:
@@ -84,6 +94,23 @@ def output_function(
         return jnp.stack(columns, axis=-1)
 
     return outputs
+
+
+def _brf_with_emission(
+    states: State, bands: tuple[str, ...], settings: Settings, sun_distance: float
+) -> dict[str, Array]:
+    """Bidirectional reflectance factor of all light, as a result of a simulation has it, by band.
+
+    NaN, with derivative 0, where the sun is down.
+    """
+    seen = radiance(states, bands, sun_distance=sun_distance, **settings._asdict())
+    mu0 = jnp.cos(jnp.asarray(states.geometry.solar_zenith))
+    found = {}
+    for k, (band, sun) in enumerate(sunlight(mu0, bands, settings.satellite, sun_distance).items()):
+        white = of_white_ground(mu0, sun)
+        by_day = white > 0
+        found[band] = jnp.where(by_day, seen[..., k] / jnp.where(by_day, white, 1), jnp.nan)
+    return found
 
 
 def _contrast(states: State, settings: Settings, sun_distance: float) -> Array:

@@ -12,6 +12,7 @@ import xarray as xr
 from ..atmosphere import Fire, State
 from ..files import InputError
 from ..plume_edges import moves_plume_edges
+from ..radiance import FIRE_BANDS, WARMEST_WITHOUT_FIRE
 from ..scene import gases_of, species_of, states_of_result, sun_path_of
 from ..scene.angles import sun_distance
 from ..settings import Settings, streams_of_attributes
@@ -84,7 +85,8 @@ def sensitivity_study(
     correlations
         Between inputs, by pairs of names. [-]
     fire
-        What burns in every pixel where the contrast of a fire is looked at.
+        What burns in every pixel where the contrast of a fire is looked at, in C05 and C06 beside
+        it as well. Without that contrast what the scene itself has of fires shines there.
     second_order, sampling
         Whether second derivatives are wanted, and the check of the variance (None: as it is by
         default).
@@ -210,14 +212,25 @@ def chosen_pixels(image: xr.Dataset, species: str | None, where: str) -> np.ndar
 
 
 def states_of(image: xr.Dataset, chosen: np.ndarray, of: Sequence[str], fire: Fire) -> State:
-    """Columns of pixels (y, x), with a fire and temperatures where its contrast is looked at."""
+    """Columns of pixels (y, x), with temperatures and a fire where what shines is looked at.
+
+    Where the contrast of a fire is, that burns in every column; elsewhere the scene's own fires do,
+    or none does over a ground that shines without, as lava, which a fire without a share tells.
+    """
     y, x = (xr.DataArray(index, dims="column") for index in np.nonzero(chosen))
-    states = states_of_result(image.isel(y=y, x=x), bands_of(of))
-    if FIRE_CONTRAST not in of:
+    bands = bands_of(of)
+    states = states_of_result(image.isel(y=y, x=x), bands)
+    if not set(bands) & set(FIRE_BANDS):
         return states
     count = int(chosen.sum())
-    burning = jax.tree.map(lambda value: np.full(count, float(value)), fire)
-    air, ground = states.atmosphere, states.surface_temperature
+    burning, air, ground = states.fire, states.atmosphere, states.surface_temperature
+    if FIRE_CONTRAST in of:
+        burning = jax.tree.map(lambda value: np.full(count, float(value)), fire)
+    elif burning is None and ground is not None and np.max(ground) > WARMEST_WITHOUT_FIRE:
+        nothing: Any = np.zeros(count), np.full(count, float(DEFAULT_FIRE.temperature))
+        burning = Fire(*nothing)
+    if burning is None:
+        return states
     if air.temperature is None:
         warm: Any = np.full_like(air.pressure, STANDARD_TEMPERATURE)
         air = replace(air, temperature=warm)

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from columns_of_smoke import BANDS, HOW, INPUTS, burning, colour, columns
 
-from abi_operator import brf
+from abi_operator import brf, radiance
 from abi_operator.products import derived_green
+from abi_operator.satellites import solar_irradiance
 from abi_operator.sensitivity import (
     covariance_of,
     declared,
@@ -137,6 +138,24 @@ def test_outputs_by_name(states):
     other = derived_green(red, blue, near, recipe="bah2018")
     np.testing.assert_allclose(some[:, 3], other, rtol=1e-12)
     np.testing.assert_allclose(some[:, 4], infrared, rtol=1e-12)
+
+
+def test_what_burns_shines_in_what_is_seen_of_it(states):
+    """As in a result: all light of C06 over that of a white ground, and its slopes."""
+    fires, distance = burning(states), 0.99
+    shining = output_function(["C06"], Settings(**HOW), distance)
+    flames = [declared("fire_fraction"), declared("fire_temperature")]
+    found = sensitivity(shining, fires, flames, second_order=False)
+    light = radiance(fires, ("C06",), sun_distance=distance, **HOW)
+    factor = light * np.pi * distance**2 / solar_irradiance("C06")
+    brightness = factor / np.cos(np.asarray(states.geometry.solar_zenith))[:, None]
+    np.testing.assert_allclose(found.value, brightness, rtol=1e-12)
+    for k, one in enumerate(flames):
+        h = STEP * one.step
+        by = jnp.zeros((6, 2)).at[:, k].set(h)
+        ahead, behind = (shining(changed(fires, flames, x)) for x in (by, -by))
+        np.testing.assert_allclose(found.jacobian[..., k], (ahead - behind) / (2 * h), rtol=1e-5)
+    assert (found.jacobian > 0).all() and (found.up > 0).all() and (found.down < 0).all()
 
 
 @pytest.mark.slow

@@ -99,6 +99,23 @@ def test_an_elasticity_is_the_same_whatever_else_is_looked_at(image):
     np.testing.assert_allclose(both[good], alone[good], rtol=1e-9)
 
 
+def test_a_scenes_own_fires_burn_in_what_is_looked_at(image):
+    """Or those whose contrast is asked for; lava shines without one."""
+    chosen, zeros = chosen_pixels(image, None, "all"), 0 * image["latitude"]
+    fires = image.assign(fire_fraction=zeros + 0.01, fire_temperature=zeros + 900.0)
+    own, asked = (states_of(fires, chosen, of, DEFAULT_FIRE) for of in (["C06"], ["fire_contrast"]))
+    for states, share, kelvin in ((own, 0.01, 900.0), (asked, 0.04, 800.0)):
+        np.testing.assert_allclose(states.fire.fraction, share)
+        np.testing.assert_allclose(states.fire.temperature, kelvin)
+        assert states.atmosphere.temperature is not None and states.surface_temperature is not None
+    assert states_of(image, chosen, ["C06"], DEFAULT_FIRE).fire is None
+    warm, lava = (
+        states_of(image.assign(surface_temperature=zeros + x), chosen, ["C06"], DEFAULT_FIRE).fire
+        for x in (300.0, 1200.0)
+    )
+    assert warm is None and (lava.fraction == 0).all()
+
+
 def test_the_suns_path_goes_with_a_sun_that_is_moved(image):
     states = states_of(image, chosen_pixels(image, None, "all"), ("C03",), DEFAULT_FIRE)
     flat, moving = image.assign_attrs(sun_path="flat"), declared("solar_zenith")
