@@ -14,20 +14,26 @@ from .ground_albedo import albedo
 from .inputs import Input, added, factor, leaf, part, several
 
 _DEGREE = np.pi / 180
+# Of a plume's picture: what is fainter has no strength that could be a depth, as nobody drew it.
+_FAINTEST = 1e-6
 
 
 def aod_550(species: str, step: float = 0.1) -> Input:
-    """Optical depth of a plume at 550 nm, also where its picture has none."""
+    """Optical depth of a plume at 550 nm, also where its picture has none.
+
+    What changes is the plume's extinction. Its brightness stays what it is, so that an input that
+    multiplies or adds to it means the same beside this one; where it is 0 there is no extinction
+    that gives a depth, and it becomes 1.
+    """
     place = f"atmosphere.plumes.{species}"
 
     def change(state: State, by: Array) -> State:
         plume = part(state, place)
-        depth = plume.aod_550 + by
-        new = replace(
-            plume,
-            brightness=jnp.ones_like(depth),
-            extinction_550=depth / (plume.top - plume.base),
-        )
+        drawn = plume.brightness >= _FAINTEST
+        brightness = jnp.where(drawn, plume.brightness, 1)
+        own = plume.extinction_550 * jnp.where(drawn, 1, plume.brightness)
+        more = by / (brightness * (plume.top - plume.base))
+        new = replace(plume, brightness=brightness, extinction_550=own + more)
         return eqx.tree_at(lambda s: part(s, place), state, new)
 
     def holds(state: State) -> np.ndarray:

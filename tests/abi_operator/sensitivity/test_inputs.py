@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from columns_of_smoke import burning, columns
 
 from abi_operator.plume_edges import moves_plume_edges
-from abi_operator.sensitivity import declared, factor, leaf
+from abi_operator.sensitivity import declared, factor, leaf, sensitivity
 from abi_operator.sensitivity.declarations import BY_BAND, SHORT_NAMES
 from abi_operator.sensitivity.inputs import changed, part
 from abi_operator.surface import LandAndSea, RossLi, ocean
@@ -32,9 +33,8 @@ NAMES = [x for x in SHORT_NAMES if x not in ("vapour", "ozone")]
 def test_no_change_changes_nothing_and_a_step_moves_the_value(states, name):
     one = declared(name, "smoke")
     same = moved(states, one, 0.0)
-    if name != "aod_550":  # which keeps the depth, and moves it from the picture to the strength
-        for ours, theirs in zip(jax.tree.leaves(same), jax.tree.leaves(states), strict=True):
-            np.testing.assert_array_equal(ours, theirs)
+    for ours, theirs in zip(jax.tree.leaves(same), jax.tree.leaves(states), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
     np.testing.assert_allclose(one.value(same), one.value(states), rtol=1e-12)
     step = moved(states, one, one.step)
     assert one.holds(states).all() and one.units and one.long_name
@@ -44,6 +44,23 @@ def test_no_change_changes_nothing_and_a_step_moves_the_value(states, name):
         np.testing.assert_allclose(part(step, path), 1.1 * part(states, path), rtol=1e-12)
     else:
         np.testing.assert_allclose(one.value(step) - one.value(states), one.step, rtol=1e-7)
+
+
+def test_a_depth_that_changes_leaves_the_picture_as_it_was(states):
+    """So that what is declared beside it, in whatever order, is of the picture too."""
+    picture = np.array([0.0, 1e-9, 0.1, 0.4, 0.7, 1.0])
+    plume = part(states, "atmosphere.plumes.smoke")
+    thick = plume.extinction_550 * (plume.top - plume.base)
+    some = eqx.tree_at(lambda s: part(s, "atmosphere.plumes.smoke").brightness, states, picture)
+    depth, strength = declared("aod_550", "smoke"), "atmosphere.plumes.smoke.brightness"
+    for inputs in ([depth, declared(strength)], [declared(strength), depth]):
+        slopes = sensitivity(depth.value, some, inputs, second_order=False).jacobian[:, 0]
+        for one, slope in zip(inputs, slopes.T, strict=True):
+            expected = 1 if one is depth else picture * thick
+            np.testing.assert_allclose(slope, expected, rtol=1e-12)
+    thicker = part(moved(some, depth, 0.3), "atmosphere.plumes.smoke")
+    np.testing.assert_array_equal(thicker.brightness, np.where(picture > 1e-6, picture, 1))
+    np.testing.assert_allclose(thicker.aod_550, picture * thick + 0.3, rtol=1e-12)
 
 
 def test_a_leaf_is_declared_by_its_place(states):
