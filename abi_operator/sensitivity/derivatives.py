@@ -32,8 +32,10 @@ class Sensitivity(NamedTuple):
         Exact derivatives (column, of, to), in the units of the inputs.
     elasticity
         Relative change of a number for a relative change of an input (column, of, to): the
-        Jacobian times input over number, and of an input of several numbers (an albedo in all
-        bands) the slope for one share of each of them, over number. [-]
+        Jacobian times input over number. Of an input with a `relative` change of its own (an albedo
+        in all bands) it is the slope for one share of each of its numbers, over number; of the
+        height of a plume, whose edges move by one length, the input is the middle of the plume,
+        and its thickness stays. [-]
     up, down
         Exact changes for a step of each input up and down (column, of, to); NaN where the column
         may not be so (a single-scattering albedo above 1).

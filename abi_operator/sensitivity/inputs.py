@@ -41,7 +41,9 @@ class Input:
         From a changed state to whether each column may be so.
     relative
         From a state to a change of it, as ``change``, by a share of each number and not by one
-        number for all; None where the input is one number, or what is changed is a share already.
+        number for all; None where the input is one number, where what is changed is a share
+        already, and where several numbers are moved together and a share of each would pull them
+        apart (the edges of a plume).
     """
 
     name: str

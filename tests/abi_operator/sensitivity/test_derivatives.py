@@ -99,6 +99,20 @@ def test_elasticities_do_not_hang_on_bands_that_are_not_looked_at(states, name):
     np.testing.assert_allclose(found.elasticity[:, 0], [[0, 2]] * 6, rtol=1e-12)
 
 
+def test_the_elasticity_by_a_plumes_height_is_by_that_of_its_middle(states):
+    """Its edges move by one length, so that nothing hangs on its thickness."""
+    plume = part(states, "atmosphere.plumes.smoke")
+    height = [declared("plume_height", "smoke")]
+
+    def edges(s):
+        smoke = part(s, "atmosphere.plumes.smoke")
+        return jnp.stack([smoke.top, smoke.top - smoke.base], axis=-1)
+
+    found = sensitivity(edges, states, height, second_order=False).elasticity[..., 0]
+    middle = (plume.base + plume.top) / 2
+    np.testing.assert_allclose(found, np.stack([middle / plume.top, 0 * middle], axis=-1))
+
+
 def test_finite_changes_are_those_of_the_operator(states, found):
     for k, one in enumerate(INPUTS):
         for ours, sign in ((found.up, 1), (found.down, -1)):
