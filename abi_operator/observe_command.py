@@ -34,7 +34,9 @@ def observe(
     calibration: Annotated[
         bool,
         typer.Option(
-            "--calibration", help="Add an error of the calibration as well, one for each band."
+            "--calibration",
+            help="Add an error of the calibration as well, one for each of C01 to C06; of C07 none "
+            "is specified.",
         ),
     ] = False,
     fire_saturation_temperature: Annotated[
