@@ -31,7 +31,8 @@ class ByHour(NamedTuple):
     Parameters
     ----------
     hours
-        After midnight, UTC; those of the place's day, with the sun up.
+        Times of day in UTC, 0 to below 24, from morning to evening at the place: where its day
+        holds a midnight of UTC they begin again at 0. [h]
     solar_zenith
         At these hours. [degree]
     contrast
@@ -129,11 +130,12 @@ def fires_figure(image: xr.Dataset, fire: Fire) -> Figure:
         curves(f"By temperature [K], {highest}", TEMPERATURES, by_heat, -2, 2, "log10 of contrast"),
         curves(
             "Lowest temperature that shows, by hour (UTC)",
-            found.hours,
+            np.unwrap(found.hours, period=24.0),
             by_hour,
             float(TEMPERATURES[0]),
             700.0,
             "K",
+            period=24.0,
         ),
     ]
     caption = f"One column without cloud or plume; a fire shows from a contrast of {SHOWS:g} on."
@@ -165,18 +167,20 @@ def _clear_place(image: xr.Dataset) -> np.ndarray:
 def _sun(image: xr.Dataset, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Hours with the sun up, every half, its zenith angle and relative azimuth. [h], [degree]
 
-    Hours are UTC, of the day of the place, from midnight to midnight there.
+    Hours are times of day in UTC, of the day that it is at the place by the sun, from midnight to
+    midnight there.
     """
     latitude, longitude = (image[x].values[place][0] for x in ("latitude", "longitude"))
     satellite = str(image.attrs.get("satellite", "GOES-16"))
     stands = float(image.attrs.get("satellite_longitude", SATELLITE_LONGITUDE[satellite]))
-    day = image["time"].values.astype("datetime64[D]")
-    hours = np.arange(0.0, 24.0, 0.5) - round(2 * longitude / 15) / 2
-    found = []
-    for hour in hours:
-        time = (day + np.timedelta64(round(60 * hour), "m")).astype("datetime64[ns]")
+    ahead = np.timedelta64(30 * round(2 * longitude / 15), "m")  # of UTC, as its sun is
+    midnight = (image["time"].values + ahead).astype("datetime64[D]") - ahead
+    hours, found = [], []
+    for half in range(48):
+        time = (midnight + np.timedelta64(30 * half, "m")).astype("datetime64[ns]")
         angles = find_angles(time, np.array([latitude]), np.array([longitude]), stands)
+        hours.append((time - time.astype("datetime64[D]")) / np.timedelta64(1, "h"))
         found.append((angles.solar_zenith[0], angles.relative_azimuth[0]))
     zenith, azimuth = np.array(found).T
     up = zenith < _LOWEST_SUN
-    return hours[up], zenith[up], azimuth[up]
+    return np.array(hours)[up], zenith[up], azimuth[up]

@@ -126,7 +126,14 @@ def scatter(title: str, x: np.ndarray, y: np.ndarray, high: float, axes: str) ->
 
 
 def curves(
-    title: str, x: np.ndarray, series: dict[str, np.ndarray], low: float, high: float, axes: str
+    title: str,
+    x: np.ndarray,
+    series: dict[str, np.ndarray],
+    low: float,
+    high: float,
+    axes: str,
+    *,
+    period: float | None = None,
 ) -> Panel:
     """Lines over one another, NaN left out.
 
@@ -140,6 +147,9 @@ def curves(
         Values by name, each as long as x.
     low, high
         Ends of the second axis; beyond them lines run along the edge.
+    period
+        Of the first axis, on which numbers begin again at 0 as hours do at 24; None where they
+        do not.
     """
     picture = Image.new("RGB", (_WIDTH, _WIDTH), "white")
     draw, bottom, top = ImageDraw.Draw(picture), _WIDTH - 30, 44
@@ -157,7 +167,7 @@ def curves(
         draw.text((8 + 74 * k, 4), name, fill=colour, font=_font())
     draw.rectangle([0, top, _WIDTH - 1, bottom], outline="black")
     draw.text((8, 24), f"{axes}, {low:.3g} to {high:.3g}", fill="black", font=_font())
-    _ends(draw, bottom + 6, Bar(float(x[0]), float(x[-1]), ""), sign="")
+    _ends(draw, bottom + 6, Bar(float(x[0]), float(x[-1]), ""), sign="", period=period)
     return Panel(title, np.asarray(picture) / 255, is_map=False)
 
 
@@ -217,11 +227,19 @@ def _curve_colour(k: int, count: int) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def _ends(draw: ImageDraw.ImageDraw, y: float, bar: Bar, sign: str = "+") -> None:
-    middle = (bar.low + bar.high) / 2
-    texts = f"{bar.low:{sign}.4g}", f"{middle:.4g}", f"{bar.high:{sign}.4g} {bar.unit}"
+def _ends(
+    draw: ImageDraw.ImageDraw, y: float, bar: Bar, sign: str = "+", period: float | None = None
+) -> None:
+    texts = _end_texts(bar, sign, period)
     for text, x, anchor in zip(texts, (0, _WIDTH / 2, _WIDTH), ("la", "ma", "ra"), strict=True):
         draw.text((x, y), text, fill="black", font=_font(), anchor=anchor)
+
+
+def _end_texts(bar: Bar, sign: str, period: float | None) -> tuple[str, str, str]:
+    """What is written at the lower end, in the middle and at the upper end."""
+    values = bar.low, (bar.low + bar.high) / 2, bar.high
+    low, middle, high = (x if period is None else x % period for x in values)
+    return f"{low:{sign}.4g}", f"{middle:.4g}", f"{high:{sign}.4g} {bar.unit}"
 
 
 def _diverging(share: np.ndarray) -> np.ndarray:

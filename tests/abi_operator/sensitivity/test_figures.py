@@ -17,7 +17,7 @@ from abi_operator.products import derived_green
 from abi_operator.sensitivity import albedo_figure, fires_by_hour, fires_figure, green_figure
 from abi_operator.sensitivity.figure_fires import ALBEDOS, SHOWS, TEMPERATURES, _clear_place
 from abi_operator.sensitivity.nir_study import brf_by_band
-from abi_operator.sensitivity.panels import curves, scatter
+from abi_operator.sensitivity.panels import Bar, _end_texts, curves, scatter
 
 FIRE = Fire(0.04, 800.0)
 figure_fires = importlib.import_module("abi_operator.sensitivity.figure_fires")
@@ -210,6 +210,49 @@ def test_fires_show_over_dark_grounds_and_by_a_low_sun(image):
     assert abs(at - np.log(SHOWS)) < 1e-9
     lines = fires_figure(image, FIRE).lines
     assert len(lines) == 2 + len(found.hours) and len(lines[-1].split()) == 2 + len(ALBEDOS)
+
+
+@pytest.fixture
+def times_asked(monkeypatch):
+    """Times at which the sun is looked for, of a pixel of an image at a longitude and a time."""
+
+    def asked(image, longitude, time):
+        times, find = [], figure_fires.find_angles
+
+        def noted(when, *where):
+            times.append(when)
+            return find(when, *where)
+
+        place = np.zeros((image.sizes["y"], image.sizes["x"]), bool)
+        place[0, 0] = True
+        zeros = 0 * image["longitude"]
+        some = image.assign(latitude=zeros, longitude=zeros + longitude, time=np.datetime64(time))
+        with monkeypatch.context() as patch:
+            patch.setattr(figure_fires, "find_angles", noted)
+            return times, *figure_fires._sun(some, place)
+
+    return asked
+
+
+@pytest.mark.parametrize("longitude, first", [(-155.0, 16.0), (-100.0, 12.0), (170.0, 18.0)])
+def test_hours_are_times_of_day(image, times_asked, longitude, first):
+    """Also where the place's day holds a midnight of UTC."""
+    _, hours, zenith, _ = times_asked(image, longitude, "2007-03-20T18:00")
+    assert ((hours >= 0) & (hours < 24)).all() and first <= hours[0] <= first + 1.5
+    np.testing.assert_allclose(np.diff(np.unwrap(hours, period=24.0)), 0.5)
+    assert len(hours) > 20 and abs(np.argmin(zenith) - len(hours) / 2) <= 1
+
+
+def test_the_day_is_that_of_the_place(image, times_asked):
+    """In the evening of the day before that of UTC."""
+    times, *_ = times_asked(image, -120.0, "2007-03-20T02:00")
+    assert min(times) == np.datetime64("2007-03-19T08:00")
+    assert max(times) == np.datetime64("2007-03-20T07:30")
+
+
+def test_an_axis_of_hours_begins_again():
+    assert _end_texts(Bar(10.5, 28.5, ""), "", 24.0) == ("10.5", "19.5", "4.5 ")
+    assert _end_texts(Bar(-0.5, 28.5, "K"), "+", None) == ("-0.5", "14", "+28.5 K")
 
 
 def test_fires_that_all_show_are_not_said_to_show_from_the_coolest_on(monkeypatch):
