@@ -3,9 +3,10 @@
 Grasso et al. (2013) asked how much of their green is near infrared, which no eye sees: they changed
 the single-scattering albedo of volcanic ash in C03 until the ash was about 10 % brighter there, and
 then darker, with one value for the scene, and mapped the change of green by their Eqs. (2) and (3).
-"About 10 %" is taken to be that of the mean over the pixels that are counted: those where the
-picture of the plume is at least 0.2 bright and nothing but the plume is in the air. Nothing else is
-simulated anew: where there is no plume, and in C01 and C02, all is as it was, to the last digit.
+"About 10 %" is taken to be that of the mean over the pixels that are counted: those in sunlight
+where the picture of the plume is at least 0.2 bright and hydrometeors have an optical depth below
+0.01; other aerosol may be beside the plume. C03 in the plume is simulated anew, as it is and as it
+becomes: where there is no plume, and in C01 and C02, all is as it was, to the last digit.
 """
 
 from typing import Any
@@ -56,7 +57,8 @@ def nir_study(
     species
         Name of the plume.
     change
-        By how much C03 is to be larger, and then smaller. [-]
+        By how much of itself C03 is to be larger, and then smaller. Where no single-scattering
+        albedo from 0 to 1 does that, the end is taken, and ``ssa_code`` says so. [-]
     pixel_by_pixel
         Whether each pixel is changed by that, with a single-scattering albedo of its own, and not
         the mean, with one for the scene.
@@ -66,16 +68,18 @@ def nir_study(
     Returns
     -------
     xarray.Dataset
-        Along ``change``, ``recipe``, y and x, reflectances being bidirectional reflectance factors:
-        ``near_infrared`` and ``green``, the same ``_changed``, by ``_first_order`` what they are by
-        the Jacobian with the same step of ``ssa``, ``green_change`` (as above),
-        ``green_change_first_order`` and ``green_change_of_base`` (G below the line); ``ssa`` and
-        ``ssa_changed`` (NaN outside the plume) and ``ssa_code`` of each pixel; ``counted``.
+        Along y and x, what is of green along ``recipe`` and what is changed along ``change`` as
+        well, reflectances being bidirectional reflectance factors: ``near_infrared`` and ``green``,
+        the same ``_changed``, by ``_first_order`` what they are by the Jacobian with the same step
+        of ``ssa``, ``green_change`` (as above), ``green_change_first_order`` and
+        ``green_change_of_base`` (G below the line); ``ssa`` and ``ssa_changed`` (NaN outside the
+        plume) and ``ssa_code`` of each pixel (0 outside); ``counted``.
 
     Raises
     ------
     InputError
-        Where the result lacks something, or no pixel is counted.
+        Where the change is not between 0 and 1, the result lacks something, no pixel is counted, or
+        no albedo is found with which the mean changes so.
     """
     if not 0 < change < 1:
         raise InputError(f"the near infrared changes by more than 0 and less than 1; got {change}.")

@@ -43,6 +43,19 @@ def test_the_mean_of_what_is_counted_changes_as_asked(study, image):
             assert abs(changed / ((1 + change) * mean) - 1) <= MEAN_TOLERANCE
 
 
+def test_its_maps_are_along_what_they_differ_by(study, image):
+    space = ("y", "x")
+    for name in ("near_infrared", "ssa", "counted"):
+        assert study[name].dims == space
+    for name in ("near_infrared_changed", "near_infrared_first_order", "ssa_changed", "ssa_code"):
+        assert study[name].dims == ("change", *space)
+    assert study["green"].dims == ("recipe", *space)
+    for name in ("changed", "first_order", "change", "change_first_order", "change_of_base"):
+        assert study[f"green_{name}"].dims == ("recipe", "change", *space)
+    outside = ~(image["ash_brightness"].values > 0)
+    assert (study["ssa_code"].values[:, outside] == 0).all()
+
+
 def test_green_changes_by_its_weight_of_the_near_infrared(study):
     for recipe, weights in GREEN_RECIPES.items():
         some = study.sel(recipe=recipe)
