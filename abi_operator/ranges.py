@@ -82,6 +82,9 @@ _WIND = Range(0.0, 37.0, "[]", "m s-1")
 _ZENITH = Range(0.0, math.pi, "[]", "rad", "0 to pi (angles are in rad)")
 # A difference of two azimuths is 2 pi at most, in float32 too; what is more is degrees.
 _AZIMUTH = Range(-6.2832, 6.2832, "[]", "rad", "-2 pi to 2 pi (angles are in rad)")
+# Of water in these bands: in none of them is light faster in it than in a vacuum, and what would be
+# more than this is no water. [-]
+_REFRACTION, _ABSORPTION = Range(1.0, 10.0), Range(0.0, 10.0)
 # At either end all light is scattered into one direction, for which there is no phase function.
 _ASYMMETRY = Range(-1.0, 1.0, "()")
 
@@ -127,7 +130,10 @@ STATE: dict[str, Range] = {
     "effective_radius_um": Range(0.0, 1e6, "()", "um"),
     "fraction": SHARE,
     "albedo": SHARE,
+    "water_share": SHARE,
     "wind_speed": _WIND,
+    "refractive_index": _REFRACTION,
+    "absorption_index": _ABSORPTION,
     "solar_zenith": _ZENITH,
     "view_zenith": _ZENITH,
     "relative_azimuth": _AZIMUTH,

@@ -31,8 +31,8 @@ def check_state(state: State) -> None:
 
     Values are read with NumPy, one column or a batch. `brf`, `reflectance_factor` and `radiance`
     call it where there are values to read; under `jax.jit` and in derivatives there are none, and
-    nothing is checked. Angles below the horizon are allowed, see `quality_flags`; an anisotropic
-    ground is judged by what it reflects, in the same flags. Values in another unit are refused
+    nothing is checked. Angles below the horizon are allowed, see `quality_flags`; how much an
+    anisotropic ground reflects is judged in the same flags. Values in another unit are refused
     where they are no longer those of air: pressure in hPa, heights in km, angles in degrees; and so
     is mass of particles without a number of them, which would be no cloud at all.
 

@@ -22,7 +22,7 @@ from abi_operator import (
 )
 from abi_operator.nomenclature import QUALITY_FLAGS
 from abi_operator.state_checks import uniform
-from abi_operator.surface import Lambertian, RossLi
+from abi_operator.surface import Lambertian, LandAndSea, RossLi, ocean
 
 # As in `test_reflectance`, for its programs.
 OPTIONS = {"num_streams": 4, "num_doublings": 4}
@@ -157,6 +157,27 @@ def test_slopes_of_a_column_that_is_no_number_are_its_own_affair():
 
     slopes, expected = (jax.grad(total)(s).albedo["C01"] for s in (bad, batch_of(2)))
     np.testing.assert_allclose(slopes[0], expected[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("read", "value", "message"),
+    [
+        (lambda g: g.water_share, 50.0, r"\.water_share of column 1 is 50\.0; allowed is 0 to 1"),
+        (lambda g: g.water_share, -0.1, r"\.water_share of column 1 is -0\.1"),
+        (lambda g: g.sea.refractive_index, 0.34, r"index of column 1 is 0\.34; allowed is 1 to 10"),
+        (lambda g: g.sea.absorption_index, -1e-9, r"\.sea\.absorption_index of column 1 is -1e-09"),
+        (lambda g: g.sea.wind_speed, 40.0, r"\.sea\.wind_speed of column 1 is 40\.0"),
+    ],
+)
+def test_a_coast_is_of_water_and_of_land(read, value, message):
+    """Percent, what is added to 1, and a sign that is that of the other convention."""
+    land = RossLi(*(jnp.full(3, x) for x in (0.2, 0.05, 0.01)))
+    sea = jax.tree.map(lambda x: jnp.full(3, x), ocean(jnp.asarray(6.0), "C01"))
+    coast = LandAndSea(land, sea, jnp.array([0.0, 0.5, 1.0]))
+    state = dataclasses.replace(batch_of(), albedo={"C01": coast})
+    check_state(state)
+    with pytest.raises(ValueError, match=message):
+        check_state(changed(state, lambda s: read(s.albedo["C01"]), 1, value))
 
 
 def test_satellites_are_known():
