@@ -68,7 +68,9 @@ def demo(
     """
     with one_sentence(), user_warnings():
         before = pictures_of_before(out)
-        with output_folder(out, outdated=partial(pictures_of_before, out)) as folder:
+        outdated = partial(pictures_of_before, out)
+        # A large scene is simulated in blocks, those of which that are done a next run finds.
+        with output_folder(out, outdated=outdated, keeps_parts=True) as folder:
             inputs = write_demo(folder / "inputs", size=size, seed=seed)
             # As in the paper, which neglects absorption by gases. Nothing is left out, since the
             # retrieval is to find the very optical depths that made the image; and few streams, as
