@@ -55,7 +55,8 @@ def surface_albedo(
     Raises
     ------
     InputError
-        Where an albedo is missing, or the file does not reach as far as the columns that need it.
+        Where an albedo is missing, where land and water have one and no land mask tells them apart,
+        or where the file does not reach as far as the columns that need it.
     """
     solar = tuple(band for band in bands if band not in THERMAL)
     check_ground(model, bands, albedo, ocean_albedo, emissivity, land_albedo, ocean_wind)
@@ -130,8 +131,8 @@ def check_ground(
     land_albedo: LandAlbedo | None = None,
     ocean_wind: OceanWind | None = None,
 ) -> None:
-    """Raise `InputError` where there is no albedo, or two, or the file's cells do not cover the
-    scene.
+    """Raise `InputError` where there is no albedo, or two, of which nothing tells where which is
+    meant, or the file's cells do not cover the scene.
 
     Parameters
     ----------
@@ -147,7 +148,8 @@ def check_ground(
     emissivity
         Of the ground in C07, needed there.
     land_albedo
-        If given, what the file does not reach needs none. [-]
+        If given, what the file does not reach needs none; where water is known, too, a land mask
+        has to tell them apart. [-]
     ocean_wind
         If given, that of water follows from it. [m s-1]
     """
@@ -163,6 +165,12 @@ def check_ground(
         raise InputError(
             "the ground has no albedo; name an albedo file, an albedo of the ocean, or both, or, "
             "for want of a file, an albedo of land."
+        )
+    if water_known and land_albedo is not None and "land_mask" not in coordinates:
+        # What the file lacks would all be taken for water, and the albedo of land for nothing.
+        raise InputError(
+            "the model has no land mask (LANDMASK or XLAND in WRF's files), and nothing else tells "
+            "water from land without an albedo; give an albedo of land or one of water, not both."
         )
     if albedo is None or land_albedo is not None:
         return

@@ -28,6 +28,18 @@ def test_water_does_not_have_it(make_model):
     assert (values == 0.2).all()
 
 
+@pytest.mark.parametrize("water", [{"ocean_albedo": 0.06}, {"ocean_wind": 5.0}])
+@pytest.mark.parametrize("with_file", [True, False])
+def test_land_and_water_are_told_apart_by_a_mask(make_model, make_albedo, water, with_file):
+    """Without one all that the file lacks was water, and land had no albedo of last resort."""
+    file = make_albedo() if with_file else None
+    words = {"ocean_albedo": None} | water | {"land_albedo": 0.2}
+    with pytest.raises(InputError, match="no land mask .* albedo of land or one of water, not bot"):
+        check_ground(make_model(land_mask=None), BANDS, file, **words)
+    check_ground(make_model(), BANDS, file, **words)
+    check_ground(make_model(land_mask=None), ("C07",), file, emissivity=0.9, **words)
+
+
 def test_the_file_comes_first(make_model, make_albedo):
     albedo = make_albedo()
     albedo["surface_albedo"][0, ..., 2] = np.nan  # C01, -116.9 E
