@@ -9,14 +9,23 @@ ALL, NONE = "all", "none"
 
 def streams(text: str) -> float:
     """An even number of streams, or the error that they may leave."""
+    share = text.endswith("%")
     try:
-        streams = float(text.removesuffix("%")) / 100 if text.endswith("%") else int(text)
-        most = most_streams(streams) if streams < 1 else streams
-    except ValueError as error:
-        word = str(error) if "streams" in str(error) else f"got {text}."
-        raise typer.BadParameter(f"streams are an even number or a percentage; {word}") from None
-    if not streams > 0 or most < 2 or most % 2:
+        streams = float(text.removesuffix("%")) / 100 if share else int(text)
+    except ValueError:
+        raise typer.BadParameter(
+            f"streams are an even number or a percentage; got {text}."
+        ) from None
+    if share and not 0 < streams < 1:  # from 1 on it would count streams
+        raise typer.BadParameter(
+            f"the error that streams may leave is above 0% and below 100%; got {text}."
+        )
+    if not share and (streams < 2 or streams % 2):
         raise typer.BadParameter(f"the number of streams is even, 2 or more; got {text}.")
+    try:
+        most_streams(streams)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
     return streams
 
 

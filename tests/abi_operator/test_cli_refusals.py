@@ -105,6 +105,8 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--num-streams", "7"], "the number of streams is even"),
         (["--num-streams", "few"], "an even number or a percentage; got few"),
         (["--num-streams", "0.0001%"], "24 streams leave an error of"),
+        (["--num-streams", "1000%"], "streams may leave is above 0% and below 100%; got 1000%."),
+        (["--num-streams", "nan%"], "streams may leave is above 0% and below 100%; got nan%."),
         (["--error-budget", "1"], "an error budget is below 1; got 1.0"),
         (["--bands", "C01,C08"], "'C08'"),
         (["--satellite", "GOES-13"], "'GOES-13'"),
