@@ -55,6 +55,7 @@ from .scene import (
     classes_present,
     completion_heights,
     fires_inside,
+    has_hot_ground,
     highest_top,
     nearest_standard_atmosphere,
     row_blocks,
@@ -89,6 +90,8 @@ class Scene(NamedTuple):
         Classes that the scene has beside cloud water.
     standard_atmosphere
         Name of that which completes the columns.
+    hot_ground
+        Whether the ground shines in C05 and C06 without a fire, somewhere and at some time.
     """
 
     request: Request
@@ -101,6 +104,7 @@ class Scene(NamedTuple):
     added_heights: tuple[float, ...]
     hydrometeors: tuple[str, ...]
     standard_atmosphere: str
+    hot_ground: bool
 
     @property
     def times(self) -> np.ndarray:
@@ -144,7 +148,7 @@ def open_scene(request: Request) -> Scene:
         raise InputError("kernels of the land are those of an albedo file; name one (--albedo).")
     fires = None if request.fires is None else read_fires(request.fires)
     inside = None
-    tops, present = [], set()
+    tops, present, hot_ground = [], set(), False
     for time in times:
         place = series.coordinates(time)
         check_sight(place, request.satellite, request.satellite_longitude)
@@ -170,6 +174,7 @@ def open_scene(request: Request) -> Scene:
             if request.droplet_number is not None:
                 request.droplet_number.over(model)
             tops.append(highest_top(model))
+            hot_ground = hot_ground or has_hot_ground(model)
             present.update(classes_present(model, request.microphysics))
     if inside is not None:
         check_fires(inside, request.bands)
@@ -188,6 +193,7 @@ def open_scene(request: Request) -> Scene:
         nearest_standard_atmosphere(
             coordinates["latitude"].values, coordinates["time"].values[times[0]]
         ),
+        hot_ground,
     )
 
 
@@ -225,6 +231,7 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         emissivity=request.emissivity,
         plumes=scene.plumes,
         fires=scene.fires,
+        hot_ground=scene.hot_ground,
         satellite=request.satellite,
         satellite_longitude=request.satellite_longitude,
         bands=request.bands,

@@ -31,6 +31,7 @@ from .fires import check_fires as check_fires
 from .fires import fires_inside as fires_inside
 from .gases import check_gases as check_gases
 from .gases import gases_of as gases_of
+from .gases import has_hot_ground as has_hot_ground
 from .grounds import OceanWind as OceanWind
 from .grounds import check_ocean_wind as check_ocean_wind
 from .hydrometeors import check_microphysics as check_microphysics

@@ -7,6 +7,7 @@ import xarray as xr
 
 from ..files import InputError
 from ..optics import ALL_GASES
+from ..radiance import WARMEST_WITHOUT_FIRE
 from .column_air import dry_air_path
 from .standard_profile import StandardProfile
 
@@ -106,6 +107,13 @@ def gas_amounts(
         "methane": np.asarray(standard.methane),
         "nitrous_oxide": np.asarray(standard.nitrous_oxide),
     }
+
+
+def has_hot_ground(model: xr.Dataset) -> bool:
+    """Whether the ground of a model shines in C05 and C06 somewhere, as a fire would (`light`)."""
+    if "surface_temperature" not in model:
+        return False
+    return bool(np.any(model["surface_temperature"].values > WARMEST_WITHOUT_FIRE))
 
 
 def air_fields(

@@ -31,7 +31,7 @@ from .column_air import complete_air, completion_heights, highest_top
 from .droplet_number import DropletNumber
 from .emissivity import Emissivity
 from .fires import burning_columns
-from .gases import air_fields, check_gases, gases_attribute
+from .gases import air_fields, check_gases, gases_attribute, has_hot_ground
 from .grounds import OceanWind, anisotropic_fields
 from .hydrometeors import Hydrometeors, hydrometeor_paths
 from .land import LandAlbedo
@@ -66,6 +66,7 @@ def scenario(
     standard_atmosphere: str | None = None,
     added_heights: Sequence[float] | None = None,
     fires: xr.Dataset | None = None,
+    hot_ground: bool | None = None,
     background_aerosol: float | None = None,
     rows: slice = slice(None),
 ) -> xr.Dataset:
@@ -135,6 +136,10 @@ def scenario(
     fires
         Fires of the whole scene, as `files.read_fires` returns them; None if there is none. The
         blocks of a scene need the same.
+    hot_ground
+        Whether some ground of the scene shines in C05 and C06 without a fire, whatever other bands
+        there are; None for that of this block (`has_hot_ground`). The blocks of a scene need the
+        same.
     background_aerosol
         Optical depth at 550 nm of aerosol that is everywhere (`optics.background_aerosol`), None
         for none. [-]
@@ -192,7 +197,9 @@ def scenario(
     standard = standard_profile(
         standard_atmosphere or nearest_standard_atmosphere(position["latitude"], time)
     )
-    emits = bool(set(bands) & set(THERMAL if fires is None else FIRE_BANDS))
+    if hot_ground is None:
+        hot_ground = has_hot_ground(model)
+    emits = bool(set(bands) & set(FIRE_BANDS if hot_ground or fires is not None else THERMAL))
     of_air, assumed = air_fields(model, height, standard, gases, emits=emits)
     if fires is not None:
         burning = burning_columns(model, fires, first_row=rows.start or 0)

@@ -176,3 +176,23 @@ def test_fires_are_seen_by_day_and_by_night(burning):
     assert expected > 3 * without["radiance"].sel(band="C06").values[day]
     mu0 = np.cos(np.radians(burning["solar_zenith_angle"].values[day]))
     assert of_c06["brf"][day] == pytest.approx(of_c06["reflectance_factor"][day] / mu0)
+
+
+def test_a_hot_ground_shines_whatever_other_bands_there_are(make_model):
+    """One column of six is hotter than 350 K, and the scenario of any bands knows of it."""
+    warmth = np.full((3, 2), 300.0)
+    warmth[1, 1] = 800.0
+    model, ground = make_model(land_mask=None, surface_temperature=warmth), {"ocean_albedo": 0.06}
+    alone = scenario(model, bands=("C06",), gases=(), **ground)
+    with_c07 = scenario(model, bands=("C06", "C07"), emissivity=0.96, gases=(), **ground)
+    for name in ("temperature", "surface_temperature"):
+        np.testing.assert_array_equal(alone[name], with_c07[name])
+    seen = simulate(alone, **OPTIONS)["radiance"].sel(band="C06")
+    expected = simulate(with_c07, bands=("C06",), **OPTIONS)["radiance"].sel(band="C06")
+    np.testing.assert_allclose(seen, expected, rtol=1e-12)
+    assert seen[1, 1] > 10 * seen[0, 1]
+    cool = scenario(model.isel(y=[0]), bands=("C06",), gases=(), **ground)
+    assert "surface_temperature" not in cool
+    told = scenario(model.isel(y=[0]), bands=("C06",), gases=(), hot_ground=True, **ground)
+    assert "surface_temperature" in told
+    assert "surface_temperature" not in scenario(model, bands=("C03",), gases=(), **ground)
