@@ -4,6 +4,8 @@ This is where readers and scenes meet: `open_scene` opens and checks everything,
 writes the result and pictures of every time.
 """
 
+import warnings
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -29,6 +31,7 @@ from .files import (
     rounded,
     stored,
 )
+from .files.stored import ALL, IMAGE
 from .nomenclature import OPTIONAL_RESULT
 from .optics import ash, smoke
 from .radiance import THERMAL
@@ -61,6 +64,7 @@ from .scene import (
     row_blocks,
     run,
     scenario,
+    variables_of_result,
 )
 
 RESULT = "result.nc"
@@ -178,7 +182,7 @@ def open_scene(request: Request) -> Scene:
             present.update(classes_present(model, request.microphysics))
     if inside is not None:
         check_fires(inside, request.bands)
-    return Scene(
+    scene = Scene(
         request,
         series,
         coordinates,
@@ -195,6 +199,9 @@ def open_scene(request: Request) -> Scene:
         ),
         hot_ground,
     )
+    if not {*request.variables} <= {ALL, IMAGE}:
+        check_variables(request.variables, _variables_of(scene))
+    return scene
 
 
 def _check_variables(request: Request) -> None:
@@ -206,21 +213,10 @@ def _check_variables(request: Request) -> None:
         )
 
 
-class Report(NamedTuple):
-    """Names of the files written, and lines to print."""
-
-    files: list[str]
-    lines: list[str]
-
-
-def simulate_scene(scene: Scene, folder: Path) -> Report:
-    """Write the result and a picture of every time.
-
-    What an earlier run has kept of the same scene in the folder, `output_folder` having found it
-    there, is not computed again.
-    """
+def _specified(scene: Scene) -> Callable[..., xr.Dataset]:
+    """`scene.scenario` of this scene, of a model Dataset and the `rows` that it holds."""
     request = scene.request
-    specify = partial(
+    return partial(
         scenario,
         albedo=scene.albedo,
         ocean_albedo=request.ocean_albedo,
@@ -246,6 +242,31 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
         standard_atmosphere=scene.standard_atmosphere,
         added_heights=scene.added_heights,
     )
+
+
+def _variables_of(scene: Scene) -> set[str]:
+    """Names of the variables that the result will have, of which the first row has all."""
+    row = slice(0, 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what there is to be said the simulation says
+        model = scene.series.read(scene.chosen_times[0], row)
+        return variables_of_result(_specified(scene)(model, rows=row))
+
+
+class Report(NamedTuple):
+    """Names of the files written, and lines to print."""
+
+    files: list[str]
+    lines: list[str]
+
+
+def simulate_scene(scene: Scene, folder: Path) -> Report:
+    """Write the result and a picture of every time.
+
+    What an earlier run has kept of the same scene in the folder, `output_folder` having found it
+    there, is not computed again.
+    """
+    request, specify = scene.request, _specified(scene)
 
     def read_block(time: int, rows: slice) -> xr.Dataset:
         return rounded(specify(scene.series.read(scene.chosen_times[time], rows), rows=rows))

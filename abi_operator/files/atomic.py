@@ -16,6 +16,8 @@ from .errors import InputError
 # What says that nothing more can be written; the NetCDF library names no such reason.
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _NETCDF = "NetCDF: "
+# With an input that is wrong the same command would only end there again.
+_MENDED = "a run in which this is mended goes on"
 
 
 @contextmanager
@@ -69,7 +71,7 @@ def output_folder(
         except InputError as error:
             if not num_parts(temporary):
                 raise
-            raise InputError(f"{str(error).rstrip('.')}{_kept(temporary)}.") from error
+            raise InputError(f"{str(error).rstrip('.')}{_kept(temporary, _MENDED)}.") from error
         except (OSError, RuntimeError) as error:
             reason = _no_room(error)
             if reason is None:
@@ -100,9 +102,10 @@ def _clear(folder: Path) -> str:
     return _kept(folder)
 
 
-def _kept(folder: Path) -> str:
+def _kept(folder: Path, next_run: str = "the same command goes on") -> str:
+    """Where parts are, if there are some, and what makes use of them."""
     kept = num_parts(folder)
-    return f"; what was simulated is kept in {folder}, and the same command goes on" if kept else ""
+    return f"; what was simulated is kept in {folder}, and {next_run}" if kept else ""
 
 
 @contextmanager

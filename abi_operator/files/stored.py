@@ -7,12 +7,12 @@ have the reflectance factor and the depths of plumes, by which retrievals withou
 and the angles, whose cosines vanish at the horizon.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import xarray as xr
 
-from ..nomenclature import MODEL, OPTIONAL, SCENARIO, variable
+from ..nomenclature import BY_BAND, MODEL, OPTIONAL, SCENARIO, variable
 from .errors import InputError
 
 ALL, IMAGE = "all", "image"
@@ -25,11 +25,23 @@ _DOUBLE = (
 )
 _DOUBLE_ENDING = "_aod_550"
 _ALWAYS = "quality_flag"
+# Go along with whatever is kept.
+_COORDINATES = ("time", "latitude", "longitude", *BY_BAND)
 _VERTICAL = {"layer", "level"}
 
 
-def check_variables(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names as a tuple, or raise `InputError` where one is none of a result's."""
+def check_variables(
+    names: Sequence[str], present: Collection[str] | None = None
+) -> tuple[str, ...]:
+    """Return the names as a tuple, or raise `InputError` where one is none of a result's.
+
+    Parameters
+    ----------
+    names
+        As `stored` takes them.
+    present
+        All that the result has, or will have; None for what any may have.
+    """
     names = tuple(names)
     if names in ((ALL,), (IMAGE,)):
         return names
@@ -39,6 +51,12 @@ def check_variables(names: Sequence[str]) -> tuple[str, ...]:
         raise InputError(
             f"variables {unknown} are not those of a result; give {ALL}, {IMAGE} or names such as "
             "reflectance_factor,radiance (abi_operator/nomenclature.py has all of them)."
+        )
+    missing = [] if present is None else [name for name in names if name not in present]
+    if missing:
+        raise InputError(
+            f"the result has no {', '.join(missing)}; choose of "
+            f"{', '.join(sorted(set(present or ()) - {*_COORDINATES}))}."
         )
     return names
 
@@ -74,12 +92,7 @@ def stored(result: xr.Dataset, names: Sequence[str] = (ALL,)) -> xr.Dataset:
     if tuple(names) == (IMAGE,):
         kept = result.drop_vars([n for n, a in result.variables.items() if _VERTICAL & {*a.dims}])
     elif not everything:
-        missing = [name for name in names if name not in result.variables]
-        if missing:
-            raise InputError(
-                f"the result has no {', '.join(missing)}; choose of "
-                f"{', '.join(sorted(map(str, result.data_vars)))}."
-            )
+        names = check_variables(names, {str(name) for name in result.variables})
         along_bands = {name: result[name] for name, a in result.coords.items() if "band" in a.dims}
         data = [name for name in dict.fromkeys([*names, _ALWAYS]) if name in result.data_vars]
         kept = result[data].assign_coords(along_bands)

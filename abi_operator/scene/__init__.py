@@ -45,6 +45,7 @@ from .scenario import scenario as scenario
 from .sight import check_sight as check_sight
 from .simulate import ERROR_BUDGET as ERROR_BUDGET
 from .simulate import simulate as simulate
+from .simulate import variables_of_result as variables_of_result
 from .snow_and_ice import IceAlbedo as IceAlbedo
 from .snow_and_ice import check_ice_albedo as check_ice_albedo
 from .species import PlumeSpecification as PlumeSpecification

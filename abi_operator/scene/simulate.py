@@ -16,9 +16,10 @@ from ..files.netcdf import cf_attributes
 from ..machine.chunks import map_chunks
 from ..machine.listening import Listener, listening
 from ..machine.sizes import chunks_to_read
-from ..nomenclature import variable
+from ..nomenclature import OPTIONAL_RESULT, RESULT, variable
 from ..optics import aerosol, background, hydrometeor, liquid_cloud, outside_fitted_range, rayleigh
 from ..quality import flags_from
+from ..radiance import THERMAL
 from ..settings import NUM_STREAMS
 from .angles import sun_distance
 from .cloud_optics import cloud_optics_of, ice_optics_of, optics_attributes
@@ -27,6 +28,7 @@ from .gases import check_gases, gases_attribute, gases_of
 from .kinds_of_ground import ground_flags
 from .light import Unheard, light
 from .parts import solved_or_found
+from .species import classes_of, species_of
 from .streams import most_streams, streams_of
 from .sun import sun_path_of
 
@@ -132,6 +134,17 @@ def simulate(
     how |= {"streams_error": num_streams} if num_streams < 1 else {}
     clouds = optics_attributes(cloud_optics_of(scenario), ice_optics_of(scenario))
     return result.assign_attrs(how | clouds | left_out | {"sun_path": sun_path_of(scenario)})
+
+
+def variables_of_result(scenario: xr.Dataset) -> set[str]:
+    """Names of all variables that `simulate` will return of a scenario in its bands."""
+    plumes, others = species_of(scenario), list(classes_of(scenario))
+    others += ["background"] if "background_aod_550" in scenario else []
+    names = {*map(str, scenario.variables), *RESULT}
+    names |= {f"{name}_optical_depth" for name in (*plumes, *others)}
+    names |= {f"{name}_aod_550" for name in plumes}
+    thermal = set(THERMAL) & set(map(str, scenario["band"].values))
+    return names | (set(OPTIONAL_RESULT) if thermal else set())
 
 
 def _flags(states: State, share_outside: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from abi_operator.scene import (
     run,
     scenario,
     simulate,
+    variables_of_result,
 )
 from abi_operator.scene.angles import sun_distance
 from abi_operator.scene.parts import part_name
@@ -46,7 +47,7 @@ def made(make_model):
 def test_a_result_is_the_scenario_with_reflectances_and_depths(made):
     result = simulate(made, **OPTIONS)
     added = {*RESULT, "smoke_optical_depth", "smoke_aod_550"}
-    assert set(result.variables) == {*made.variables, *added}
+    assert set(result.variables) == {*made.variables, *added} == variables_of_result(made)
     assert set(made.data_vars).isdisjoint(added)
     for name, entry in RESULT.items():
         assert result[name].dims == entry.dims and np.isfinite(result[name]).all()
@@ -185,6 +186,7 @@ def test_c07_is_simulated_by_day_and_by_night(warm):
     assert set(OPTIONAL_RESULT) | {"ice_optical_depth", "rain_optical_depth"} < set(
         result.variables
     )
+    assert set(result.variables) == variables_of_result(warm)
     assert np.isnan(result["reflectance_factor"].sel(band="C07")).all()
     assert np.isnan(result["brf"].sel(band="C07")).all()
     seen = np.isfinite(result["radiance"].sel(band="C07").values)
