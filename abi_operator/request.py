@@ -7,10 +7,15 @@ from typing import NamedTuple
 
 from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import GRASSO2013
+from .files import InputError
 from .files.stored import ALL
 from .optics import ALL_GASES
+from .radiance import THERMAL
 from .scene import ERROR_BUDGET, DropletNumber, Emissivity, IceAlbedo, LandAlbedo, OceanWind
 from .settings import NUM_STREAMS
+
+PLUME_AOD = 2.0
+"""Optical depth at 550 nm of a plume where its picture is white, unless another is given. [-]"""
 
 
 class Species(StrEnum):
@@ -38,7 +43,8 @@ class Request(NamedTuple):
     plume
         Picture of a plume, as `files.read_plume` takes it.
     plume_species, plume_aod
-        What the plume is made of; optical depth at 550 nm where the picture is white. [-]
+        What the plume is made of, None for smoke; optical depth at 550 nm where the picture is
+        white, None for `PLUME_AOD`. [-]
     bands, broadband
         Bands to simulate, and whether broadband albedo may stand in for a missing one.
     emissivity
@@ -70,8 +76,8 @@ class Request(NamedTuple):
     albedo: Path | None = None
     ocean_albedo: float | None = None
     plume: Path | None = None
-    plume_species: Species = Species.SMOKE
-    plume_aod: float = 2.0
+    plume_species: Species | None = None
+    plume_aod: float | None = None
     fires: Path | None = None
     land_kernels: bool = False
     ocean_wind: OceanWind | None = None
@@ -97,3 +103,31 @@ class Request(NamedTuple):
     variables: tuple[str, ...] = (ALL,)
     rayleigh_correction: bool = True
     command: str | None = None
+
+
+def check_effects(request: Request) -> None:
+    """Raise `InputError` where something is given that would have no effect without another."""
+    thermal = set(request.bands) & set(THERMAL)
+    if request.emissivity is not None and not thermal:
+        raise InputError(
+            f"an emissivity (--emissivity) is that of the ground in {', '.join(THERMAL)}; simulate "
+            "that band, too (--bands), or leave the emissivity out."
+        )
+    if request.plume is None:
+        given = {"--plume-species": request.plume_species, "--plume-aod": request.plume_aod}
+        for name in (name for name, value in given.items() if value is not None):
+            raise InputError(f"{name} is of a plume; name its picture (--plume), or leave it out.")
+    if request.albedo is None:
+        if request.land_kernels:
+            raise InputError(
+                "kernels of the land are those of an albedo file; name one (--albedo)."
+            )
+        if request.broadband:
+            raise InputError(
+                "broadband albedo (--broadband) is that of an albedo file; name one (--albedo)."
+            )
+    elif set(request.bands) == thermal:
+        raise InputError(
+            f"an albedo file (--albedo) is of bands of sunlight; simulate one beside "
+            f"{', '.join(THERMAL)} (--bands), or leave the file out."
+        )

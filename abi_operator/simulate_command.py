@@ -18,7 +18,7 @@ from .machine.backend import device_in_words
 from .optics import ALL_GASES
 from .scene import CLASSES, ERROR_BUDGET, DropletNumber
 from .settings import NUM_STREAMS
-from .simulation import Report, Request, Species, open_scene, pictures_of_before, simulate_scene
+from .simulation import Report, Request, open_scene, pictures_of_before, simulate_scene
 
 _IMAGER_BANDS = tuple(name for name in BANDS if name != "green")
 _BANDS = ",".join(GRASSO2013)
@@ -40,8 +40,8 @@ def simulate(
     broadband: options.Broadband = False,
     emissivity: options.Emissivity = None,
     plume: options.Plume = None,
-    plume_species: options.PlumeSpecies = Species.SMOKE,
-    plume_aod: options.PlumeAod = 2.0,
+    plume_species: options.PlumeSpecies = None,
+    plume_aod: options.PlumeAod = None,
     background_aerosol: options.BackgroundAerosol = None,
     fires: options.Fires = None,
     gases: options.Gases = option_texts.ALL,

@@ -12,7 +12,7 @@ from .atmosphere import ICE_OPTICS, LIQUID_OPTICS
 from .bands import BANDS
 from .microphysics import SCHEMES
 from .optics import ALL_GASES
-from .request import Species
+from .request import PLUME_AOD, Species
 from .satellites import SATELLITES
 from .scene import CLASSES
 from .surface import EMISSIVITY_3900NM, SNOW_AND_ICE_ALBEDO
@@ -118,9 +118,17 @@ Plume = Annotated[
         help="Add a plume where this greyscale PNG is bright, one pixel a column, north at the top."
     ),
 ]
-PlumeSpecies = Annotated[Species, typer.Option(help="What the plume is made of.")]
+PlumeSpecies = Annotated[
+    Species | None,
+    typer.Option(help="What the plume is made of.", show_default=str(Species.SMOKE)),
+]
 PlumeAod = Annotated[
-    float, typer.Option(min=0, help="Optical depth of the plume at 550 nm where it is white.")
+    float | None,
+    typer.Option(
+        min=0,
+        help="Optical depth of the plume at 550 nm where it is white.",
+        show_default=f"{PLUME_AOD:g}",
+    ),
 ]
 BackgroundAerosol = Annotated[
     float | None,

@@ -36,6 +36,7 @@ from .nomenclature import OPTIONAL_RESULT
 from .optics import ash, smoke
 from .radiance import THERMAL
 from .report import account_lines, flag_lines, plume_lines
+from .request import PLUME_AOD, check_effects
 from .request import Request as Request
 from .request import Species as Species
 from .scene import (
@@ -131,6 +132,7 @@ def open_scene(request: Request) -> Scene:
     check_background_aerosol(request.background_aerosol)
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
+    check_effects(request)
     _check_variables(request)
     series = open_wrf_series(request.wrf)
     times = series.find(request.time)
@@ -139,17 +141,16 @@ def open_scene(request: Request) -> Scene:
     plumes = {}
     if request.plume is not None:
         brightness = read_plume(request.plume, shape)
-        kind = {Species.SMOKE: smoke, Species.ASH: ash}[request.plume_species]
-        plume = kind(request.plume_aod, bands=request.bands)
-        plumes[str(request.plume_species)] = PlumeSpecification(plume, brightness)
-    solar = tuple(band for band in request.bands if band not in THERMAL)
+        species = request.plume_species or Species.SMOKE
+        aod = PLUME_AOD if request.plume_aod is None else request.plume_aod
+        plume = {Species.SMOKE: smoke, Species.ASH: ash}[species](aod, bands=request.bands)
+        plumes[str(species)] = PlumeSpecification(plume, brightness)
     albedo = None
-    if request.albedo is not None and solar:
+    if request.albedo is not None:
+        solar = tuple(band for band in request.bands if band not in THERMAL)
         albedo = read_mcd43a1(
             request.albedo, solar, broadband=request.broadband, kernels=request.land_kernels
         )
-    elif request.land_kernels and request.albedo is None:
-        raise InputError("kernels of the land are those of an albedo file; name one (--albedo).")
     fires = None if request.fires is None else read_fires(request.fires)
     inside = None
     tops, present, hot_ground = [], set(), False
