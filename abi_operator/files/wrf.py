@@ -191,13 +191,15 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
 
 def _field(file: xr.Dataset, name: str, *, time: int, rows: slice, path: FilePath) -> xr.DataArray:
     """One of WRF's variables in our dimensions, top first."""
-    num_times = file.sizes.get("Time", 0)
+    single = "Time" not in file.sizes  # one time, the dimension of which was squeezed out
+    num_times = file.sizes.get("Time", 1)
     if not 0 <= time < num_times:
         raise InputError(f"{path} has {num_times} times; ask for one of them, from 0, not {time}.")
     array = file[name]
     ours = VARIABLE_MAP[name]
     dims = MODEL[ours].dims
-    fixed = "Time" not in array.dims and dims == ("y", "x")  # written once for all times
+    written_once = "Time" not in array.dims and dims == ("y", "x")  # for all times
+    fixed = single or written_once
     theirs = tuple(theirs for dim in dims for theirs, own in DIMENSIONS.items() if own == dim)
     require_dims(array, theirs if fixed else ("Time", *theirs), path)
     check_stated_units(array, ours, path)

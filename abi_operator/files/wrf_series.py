@@ -114,7 +114,8 @@ def open_wrf_series(wrf: FilePath | Sequence[FilePath]) -> WrfSeries:
     Raises
     ------
     InputError
-        Where a file cannot be read, is of another grid or run, or has a time that another one has.
+        Where a file cannot be read, is of another grid or run, or has a time twice, or one that
+        another file has.
     """
     paths = _files([wrf] if isinstance(wrf, str | PathLike) else wrf)
     first, moving = wrf_coordinates(paths[0]), False
@@ -136,13 +137,18 @@ def open_wrf_series(wrf: FilePath | Sequence[FilePath]) -> WrfSeries:
         places += [(path, index) for index in range(own.sizes["time"])]
         moments.append(own["time"].values)
     times = np.concatenate(moments).astype("datetime64[ns]")
-    if len(paths) > 1:
-        order = np.argsort(times, kind="stable")
-        places, times = [places[i] for i in order], times[order]
-        for i in np.flatnonzero(times[1:] == times[:-1]):
-            (one, _), (other, _) = places[i], places[i + 1]
+    order = np.argsort(times, kind="stable")
+    for i, k in zip(order[:-1], order[1:], strict=True):
+        if times[i] == times[k]:
+            (one, _), (other, _) = places[i], places[k]
             moment = np.datetime_as_string(times[i], unit="s")
+            if one == other:
+                raise InputError(
+                    f"{one} has the time {moment} twice; cut one of the two out of it."
+                )
             raise InputError(f"{one} and {other} both have the time {moment}; give it once.")
+    if len(paths) > 1:
+        places, times = [places[i] for i in order], times[order]
     return WrfSeries(tuple(places), times, moving)
 
 

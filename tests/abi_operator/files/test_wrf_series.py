@@ -3,6 +3,7 @@
 import netCDF4
 import numpy as np
 import pytest
+import xarray as xr
 
 from abi_operator.files import InputError, open_wrf_series, read_wrf
 
@@ -128,3 +129,27 @@ def test_one_grid_is_asked_for(one_time_each):
     keep_first_time(one_time_each[1], num_columns=1)
     with pytest.raises(InputError, match="west_east is 1 in .*wrfout_b and 2 in .*wrfout_a; give"):
         open_wrf_series(one_time_each)
+
+
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_time_that_a_file_has_twice_is_refused(write_wrf_twin, one_time_each, beside):
+    """Its second picture and result would take the place of the first."""
+    text = "2007-10-25_18:00:00"
+    path = write_wrf_twin(time_texts=(text, text), name="wrfout_twice")
+    with pytest.raises(InputError, match="twice has the time 2007-10-25T18:00:00 twice; cut one"):
+        open_wrf_series([path, *one_time_each] if beside else path)
+
+
+def test_a_time_dimension_that_was_squeezed_out_is_one_time(write_wrf_twin, tmp_path):
+    path = write_wrf_twin(time_texts=("2007-10-23_18:00:00", "2007-10-23_18:30:00"))
+    squeezed = tmp_path / "squeezed.nc"
+    with xr.open_dataset(path, decode_times=False) as file:
+        file.isel(Time=1).to_netcdf(squeezed, unlimited_dims=())
+    whole, one = open_wrf_series(path), open_wrf_series(squeezed)
+    assert one.places == ((squeezed, 0),)
+    np.testing.assert_array_equal(one.times, whole.times[1:])
+    assert one.coordinates(0).sizes == {"time": 1, "y": 3, "x": 2}
+    for rows in (slice(None), slice(1, 3)):
+        assert one.read(0, rows).identical(whole.read(1, rows))
+    with pytest.raises(InputError, match="has 1 times; ask for one of them, from 0, not 1"):
+        read_wrf(squeezed, 1)
