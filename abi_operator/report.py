@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from .nomenclature import QUALITY_FLAGS
-from .scene import CLASSES, PlumeSpecification, negative_lines
+from .scene import CLASSES, COUNTED_OVER, PlumeSpecification, negative_lines
 
 # Attributes of the scene that say where a quantity comes from, and what to call it.
 _SOURCES = {
@@ -33,7 +33,9 @@ def flag_lines(result: xr.Dataset) -> Iterator[str]:
     flags = result["quality_flag"].values
     counts = {name: np.count_nonzero(flags & bit) for name, bit in QUALITY_FLAGS.items()}
     flagged = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
-    yield f"{flags.size} pixels; flagged: {flagged or 'none'}"
+    num_times = result.sizes.get("time", 1)
+    of_all = f" of {num_times} times" if num_times > 1 else ""
+    yield f"{flags.size} pixels{of_all}; flagged: {flagged or 'none'}"
 
 
 def plume_lines(plumes: Mapping[str, PlumeSpecification]) -> Iterator[str]:
@@ -48,7 +50,9 @@ def plume_lines(plumes: Mapping[str, PlumeSpecification]) -> Iterator[str]:
 
 
 def account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
-    """What was assumed and left out."""
+    """What was assumed and left out; of several times, that counts are sums over them."""
+    times = str(account[COUNTED_OVER]).split(",")[0] if COUNTED_OVER in account else ""
+    summed = f" (sum over {times})" if times else ""
     lowest, highest = (
         f"{float(account[f'{end}_model_top_pressure']) / 100:.0f}"
         for end in ("smallest", "largest")
@@ -72,15 +76,17 @@ def account_lines(account: Mapping[str, str | int | float]) -> Iterator[str]:
             yield f"{words}: {account[name]}"
     for name, words in _COVERS.items():
         if name in account:
-            yield f"{words}: {account[name]} columns"
+            yield f"{words}: {account[name]} columns{summed}"
     if "fire_count" in account:
         shared = account["fires_joined_count"]
         joined = f"; {shared} share a column with others" if shared else ""
         yield (
-            f"fires: {account['fire_count']} in {account['burning_columns_count']} columns{joined}"
+            f"fires: {account['fire_count']} in {account['burning_columns_count']} "
+            f"columns{joined}{summed}"
         )
     if account["unsimulated_condensate_share"]:
         share = 100 * float(account["unsimulated_condensate_share"])
         kinds = str(account["unsimulated_condensate"]).replace("; ", ", ")
         yield f"{share:.2g} % of the condensate's mass: not simulated ({kinds})"
-    yield from negative_lines(account)
+    for line in negative_lines(account):
+        yield line + summed

@@ -7,6 +7,7 @@ adds radiances and reflectances, and `run` does so for scenes that do not fit in
 is opened here.
 """
 
+from .account import COUNTED_OVER as COUNTED_OVER
 from .account import add_accounts as add_accounts
 from .account import negative_lines as negative_lines
 from .albedo import check_ground as check_ground

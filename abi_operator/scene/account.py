@@ -10,6 +10,9 @@ from .hydrometeors import Hydrometeors
 
 Attribute = str | int | float
 
+COUNTED_OVER = "counted_over"
+"""Attribute of a scene of several times: over how many of them its counts are sums."""
+
 _TOTAL = "condensate_mass"
 _SHARES = {"unsimulated_condensate_share": "unsimulated_condensate_mass"}
 

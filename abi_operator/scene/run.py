@@ -8,7 +8,7 @@ import xarray as xr
 from ..files import Parts
 from ..radiance import THERMAL
 from ..settings import NUM_STREAMS
-from .account import Attribute, add_accounts
+from .account import COUNTED_OVER, Attribute, add_accounts
 from .progress import Progress
 from .simulate import ERROR_BUDGET, simulate
 
@@ -66,7 +66,8 @@ def run(
 
     Returns
     -------
-    Attributes that account for the whole scene (`add_accounts`).
+    Attributes that account for the whole scene (`add_accounts`). Of several times counts are sums,
+    and ``counted_over`` says so.
     """
     account: dict[str, Attribute] = {}
     total = len(times) * shape[0] * shape[1]
@@ -90,4 +91,6 @@ def run(
                 write_block(time_index, rows, result)
                 account = add_accounts([account, result.attrs])
                 bar.end()
+    if len(times) > 1:
+        account[COUNTED_OVER] = f"{len(times)} times, of which all that ends in _count is the sum"
     return account

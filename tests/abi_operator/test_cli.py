@@ -289,13 +289,16 @@ def test_several_files_and_times_by_name(invoke, tmp_path, inputs):
             hours = np.array(["2007-10-23T18", "2007-10-23T20"], "datetime64[ns]")
             np.testing.assert_array_equal(result["time"], hours)
             assert result.attrs["wrf_file"] == f"{inputs.wrf.name}; {later.name}"
+            assert result.attrs["counted_over"].startswith("2 times, ")
             assert result.attrs["error_budget"] == 1e-3
             early, late = result["solar_zenith_angle"].mean(["y", "x"]).values
             assert late < early
+        assert "\n128 pixels of 2 times; flagged: " in outcome.stdout
     outcome = invoke("simulate", *wrf, *options, "--time", "2007-10-23T20:00")
     assert outcome.exit_code == 0, outcome.output
     with read_result(tmp_path / "out" / "result.nc") as result:
         np.testing.assert_array_equal(result["time"], hours[1:])
+        assert "counted_over" not in result.attrs
         assert result.attrs["wrf_file"] == later.name
 
 

@@ -234,6 +234,7 @@ def test_a_run_goes_through_all_times_and_rows(made):
         written[time_index, rows.start] = result
 
     account = run(read, times, (3, 2), write, block_columns=4, progress=False, **OPTIONS)
+    assert account["counted_over"].startswith("2 times, ")
     assert list(written) == [(0, 0), (0, 2), (1, 0), (1, 2)]
     assert account["assumed_droplet_number_count"] == 4
     assert account["num_streams"] == 2
