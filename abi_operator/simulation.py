@@ -149,7 +149,11 @@ def open_scene(request: Request) -> Scene:
     if request.albedo is not None:
         solar = tuple(band for band in request.bands if band not in THERMAL)
         albedo = read_mcd43a1(
-            request.albedo, solar, broadband=request.broadband, kernels=request.land_kernels
+            request.albedo,
+            solar,
+            broadband=request.broadband,
+            kernels=request.land_kernels,
+            times=series.times[list(times)],
         )
     fires = None if request.fires is None else read_fires(request.fires)
     inside = None

@@ -12,6 +12,7 @@ from ..nomenclature import MODEL
 from ..surface.modis_to_abi import MODIS_TO_ABI, BandRegression
 from ..surface.ross_li import WHITE_SKY
 from .errors import InputError
+from .nearest_date import nearest_date
 from .netcdf import FilePath, cf_attributes, load, open_netcdf, require_dims, require_variables
 from .plausible import check_values, plausible
 
@@ -90,7 +91,12 @@ def read_white_sky(path: FilePath, modis_bands: Sequence[str]) -> xr.Dataset:
 
 
 def read_mcd43a1(
-    path: FilePath, bands: Sequence[str], *, broadband: bool = False, kernels: bool = False
+    path: FilePath,
+    bands: Sequence[str],
+    *,
+    broadband: bool = False,
+    kernels: bool = False,
+    times: np.ndarray | None = None,
 ) -> xr.Dataset:
     """Read white-sky albedo in bands of ABI from an AppEEARS file of MCD43A1.
 
@@ -109,6 +115,9 @@ def read_mcd43a1(
     broadband
         Whether a broadband (vis, nir) may stand in for spectral bands that the file lacks; each
         such band is warned of.
+    times
+        Times of a scene (time,), UTC: only the dates that they have, the nearest to each
+        (`nearest_date`), are read; None for all dates of the file.
 
     Returns
     -------
@@ -128,7 +137,7 @@ def read_mcd43a1(
         _check_projection(file, path)
         regressions = _choose_regressions(file, bands, broadband, path)
         used = tuple(dict.fromkeys(name for r in regressions for name in r.weights))
-        weights, quality, coordinates, num_invalid = _read(file, used, path)
+        weights, quality, coordinates, num_invalid = _read(file, used, path, times)
     white_sky = {name: x @ np.array(WHITE_SKY) for name, x in weights.items()}
     albedo = np.stack(
         [r.offset + sum(w * white_sky[n] for n, w in r.weights.items()) for r in regressions]
@@ -169,9 +178,12 @@ def read_mcd43a1(
 
 
 def _read(
-    file: xr.Dataset, names: tuple[str, ...], path: FilePath
+    file: xr.Dataset, names: tuple[str, ...], path: FilePath, times: np.ndarray | None = None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict, int]:
-    """Kernel weights and quality of MODIS bands, coordinates, and how many weights are invalid."""
+    """Kernel weights and quality of MODIS bands, coordinates, and how many weights are invalid.
+
+    Of the dates that `times` have, in the order of the file, or of all.
+    """
     require_variables(
         file,
         ["time", "lat", "lon", *(_QUALITY + name for name in names)],
@@ -179,7 +191,11 @@ def _read(
         "request the area from AppEEARS in NetCDF format, with its quality layers",
     )
     coordinates: dict = {name: _axis(file, name, path) for name in ("lat", "lon")}
-    coordinates["time"] = ("time", _times(file, path), {"standard_name": "time"})
+    dates = _times(file, path)
+    if times is not None:
+        chosen = sorted({nearest_date(dates, time)[0] for time in times})
+        file, dates = file.isel(time=chosen), dates[chosen]
+    coordinates["time"] = ("time", dates, {"standard_name": "time"})
     weights, quality, num_invalid = {}, {}, 0
     for name in names:
         weights[name], invalid = _kernel_weights(file, name, path)

@@ -7,6 +7,7 @@ import xarray as xr
 
 from ..files import InputError
 from ..files.cell_bounds import cell_bounds
+from ..files.nearest_date import nearest_date
 from .cell_means import CellMeans, cell_means
 
 # Further from a date of the albedo file, a scene's albedo is warned of. [day] (the length of the
@@ -105,20 +106,12 @@ def check_extent(coordinates: xr.Dataset, albedo: xr.Dataset, needed: np.ndarray
 
 
 def _nearest_time(albedo: xr.Dataset, time: np.datetime64 | np.ndarray) -> xr.DataArray:
-    """Albedo of the day of `time`, or else of the nearest; warn where that is far away.
-
-    A date of MODIS's albedo is a day, in the middle of the 16 from which it is made, and so not the
-    midnight at which it begins. Of two days that are equally far the one nearer to `time` is taken.
-    """
-    now = np.asarray(time, "datetime64[ns]")
-    days = albedo["time"].values.astype("datetime64[D]")
-    away = np.abs((days - now.astype("datetime64[D]")) / np.timedelta64(1, "D"))
-    noons = days.astype("datetime64[ns]") + np.timedelta64(12, "h")
-    best = np.lexsort((np.abs((noons - now) / np.timedelta64(1, "h")), away))[0]
-    nearest = albedo["surface_albedo"].isel(time=int(best))
-    if away[best] > _FARTHEST:
+    """Albedo of the day of `time`, or else of the nearest; warn where that is far away."""
+    best, away = nearest_date(albedo["time"].values, time)
+    nearest = albedo["surface_albedo"].isel(time=best)
+    if away > _FARTHEST:
         warnings.warn(
-            f"the nearest date of the albedo file, {_date(nearest)}, is {away[best]:.0f} days away "
+            f"the nearest date of the albedo file, {_date(nearest)}, is {away:.0f} days away "
             "from the scene.",
             UserWarning,
             stacklevel=3,

@@ -6,7 +6,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from abi_operator.files import InputError, read_mcd43a1, read_white_sky
+from abi_operator.files import InputError, mcd43, read_mcd43a1, read_white_sky
 from abi_operator.surface import MODIS_TO_ABI
 
 FILL = 32767
@@ -122,6 +122,25 @@ def test_times_are_dates_whatever_the_calendar(write_albedo_twin, calendar):
     time = read_mcd43a1(path, ["C01"])["time"]
     assert time.dtype == "datetime64[ns]"
     np.testing.assert_array_equal(time, np.array(["2007-10-15", "2007-10-23"], "datetime64[ns]"))
+
+
+def test_only_the_dates_that_a_scene_has_are_read(write_albedo_twin, monkeypatch):
+    """A month of dates would be a month's worth of memory."""
+    packed = weights(300, shape=(31, 2, 3))
+    packed[..., 0] += np.arange(31, dtype=np.int16)[:, None, None]
+    path = write_albedo_twin({"Band3": packed})
+    whole = read_mcd43a1(path, ["C01"], kernels=True)
+    load, sizes = mcd43.load, []
+
+    def counted(array, path):
+        sizes.append(array.size)
+        return load(array, path)
+
+    monkeypatch.setattr(mcd43, "load", counted)
+    times = whole["time"].values[[9, 4]] + np.array([30, -20], "timedelta64[h]")  # a day from each
+    some = read_mcd43a1(path, ["C01"], kernels=True, times=times)
+    assert some.identical(whole.isel(time=[4, 9]))
+    assert max(sizes) == 2 * 2 * 3 * 3
 
 
 def test_missing_bands_are_named_and_the_remedy_too(write_albedo_twin):
