@@ -124,37 +124,13 @@ class Scene(NamedTuple):
 
 def open_scene(request: Request) -> Scene:
     """Open and check all that a request names; whatever is wrong is an `InputError`."""
-    check_absorption(request.satellite, request.bands, check_gases(request.gases))
-    check_classes(request.hydrometeors or ())
-    check_microphysics(request.microphysics)
-    check_cloud_optics(request.cloud_optics)
-    check_ice_optics(request.ice_optics)
-    check_background_aerosol(request.background_aerosol)
-    check_ice_albedo(request.sea_ice_albedo, "sea ice")
-    check_ice_albedo(request.snow_albedo, "snow")
-    check_effects(request)
-    _check_variables(request)
+    _check_request(request)
     series = open_wrf_series(request.wrf)
     times = series.find(request.time)
     coordinates = series.coordinates(times[0])
     shape = coordinates.sizes["y"], coordinates.sizes["x"]
-    plumes = {}
-    if request.plume is not None:
-        brightness = read_plume(request.plume, shape)
-        species = request.plume_species or Species.SMOKE
-        aod = PLUME_AOD if request.plume_aod is None else request.plume_aod
-        plume = {Species.SMOKE: smoke, Species.ASH: ash}[species](aod, bands=request.bands)
-        plumes[str(species)] = PlumeSpecification(plume, brightness)
-    albedo = None
-    if request.albedo is not None:
-        solar = tuple(band for band in request.bands if band not in THERMAL)
-        albedo = read_mcd43a1(
-            request.albedo,
-            solar,
-            broadband=request.broadband,
-            kernels=request.land_kernels,
-            times=series.times[list(times)],
-        )
+    plumes = _plumes(request, shape)
+    albedo = _albedo(request, series.times[list(times)])
     fires = None if request.fires is None else read_fires(request.fires)
     inside = None
     tops, present, hot_ground = [], set(), False
@@ -207,6 +183,44 @@ def open_scene(request: Request) -> Scene:
     if not {*request.variables} <= {ALL, IMAGE}:
         check_variables(request.variables, _variables_of(scene))
     return scene
+
+
+def _check_request(request: Request) -> None:
+    """Raise `InputError` for whatever is wrong with a request before any file is opened."""
+    check_absorption(request.satellite, request.bands, check_gases(request.gases))
+    check_classes(request.hydrometeors or ())
+    check_microphysics(request.microphysics)
+    check_cloud_optics(request.cloud_optics)
+    check_ice_optics(request.ice_optics)
+    check_background_aerosol(request.background_aerosol)
+    check_ice_albedo(request.sea_ice_albedo, "sea ice")
+    check_ice_albedo(request.snow_albedo, "snow")
+    check_effects(request)
+    _check_variables(request)
+
+
+def _plumes(request: Request, shape: tuple[int, int]) -> dict[str, PlumeSpecification]:
+    """The plume of which a picture is given, by its species."""
+    if request.plume is None:
+        return {}
+    brightness = read_plume(request.plume, shape)
+    species = request.plume_species or Species.SMOKE
+    aod = PLUME_AOD if request.plume_aod is None else request.plume_aod
+    plume = {Species.SMOKE: smoke, Species.ASH: ash}[species](aod, bands=request.bands)
+    return {str(species): PlumeSpecification(plume, brightness)}
+
+
+def _albedo(request: Request, times: np.ndarray) -> xr.Dataset | None:
+    """What the albedo file has for these times, if there is one."""
+    if request.albedo is None:
+        return None
+    return read_mcd43a1(
+        request.albedo,
+        tuple(band for band in request.bands if band not in THERMAL),
+        broadband=request.broadband,
+        kernels=request.land_kernels,
+        times=times,
+    )
 
 
 def _check_variables(request: Request) -> None:
