@@ -48,7 +48,7 @@ Bands = Annotated[
 Albedo = Annotated[
     Path | None,
     typer.Option(
-        help="How bright the land is: MODIS albedo MCD43A1 (kernel weights and quality) of "
+        help="How bright the land is: MODIS albedo MCD43A1 (kernel weights, of any quality) of "
         "Band1, 2, 3, 6 and 7, also of Band5 for C04 and C05 and of Band4 for green, as a "
         "NetCDF file from AppEEARS, projection Geographic."
     ),

@@ -57,7 +57,8 @@ def read_white_sky(path: FilePath, modis_bands: Sequence[str]) -> xr.Dataset:
     -------
     xarray.Dataset
         ``white_sky_albedo`` (modis_band, time, lat, lon) [-], f_iso + 0.189184 f_vol - 1.377622
-        f_geo, NaN where the file has none, and ``albedo_quality``, the mandatory quality.
+        f_geo, NaN where the file has none, and ``albedo_quality``, the mandatory quality, if the
+        file has that of all of these bands.
 
     Raises
     ------
@@ -77,15 +78,12 @@ def read_white_sky(path: FilePath, modis_bands: Sequence[str]) -> xr.Dataset:
         "long_name": "white-sky albedo of the ground",
         "num_outside_valid_range": num_invalid,
     }
+    fields = {"white_sky_albedo": (dims, np.stack([white_sky[n] for n in modis_bands]), attributes)}
+    if set(modis_bands) <= set(quality):
+        worst = np.stack([quality[n] for n in modis_bands])
+        fields["albedo_quality"] = (dims, worst, _QUALITY_ATTRIBUTES)
     return xr.Dataset(
-        {
-            "white_sky_albedo": (dims, np.stack([white_sky[n] for n in modis_bands]), attributes),
-            "albedo_quality": (
-                dims,
-                np.stack([quality[n] for n in modis_bands]),
-                _QUALITY_ATTRIBUTES,
-            ),
-        },
+        fields,
         coords={"modis_band": list(modis_bands), **coordinates},
     )
 
@@ -128,7 +126,8 @@ def read_mcd43a1(
         0..1 (``num_outside_unit_interval``), and kernel weights outside the file's valid range
         (``num_outside_valid_range``). ``albedo_quality``, same dimensions, uint8: the worst
         mandatory quality among the MODIS bands used; 0 full inversion, 1 magnitude inversion, 255
-        none. ``volume_kernel_weight`` and ``geometric_kernel_weight``, likewise, of `kernels`: by
+        none; it is there if the file has that of all of them, and albedo of any quality is taken.
+        ``volume_kernel_weight`` and ``geometric_kernel_weight``, likewise, of `kernels`: by
         the same regression without its constant, NaN where the albedo is. The order of ``lat`` is
         the file's.
     """
@@ -142,7 +141,6 @@ def read_mcd43a1(
     albedo = np.stack(
         [r.offset + sum(w * white_sky[n] for n, w in r.weights.items()) for r in regressions]
     )
-    worst = np.stack([np.maximum.reduce([quality[n] for n in r.weights]) for r in regressions])
     held = (albedo >= _LOWEST_BLACK) & (albedo < 0)
     albedo[held] = 0.0
     outside = (albedo < 0) | (albedo > 1)
@@ -159,18 +157,20 @@ def read_mcd43a1(
     quality_attributes = _QUALITY_ATTRIBUTES | {
         "long_name": "worst mandatory quality of the MODIS bands used"
     }
-    of_kernels = {}
+    beside = {}
+    if set(used) <= set(quality):
+        worst = np.stack([np.maximum.reduce([quality[n] for n in r.weights]) for r in regressions])
+        beside["albedo_quality"] = (("band", *_GRID), worst, quality_attributes)
     for name, kernel in KERNELS.items() if kernels else ():
         values = np.stack(
             [sum(w * weights[n][..., kernel] for n, w in r.weights.items()) for r in regressions]
         )
         values[outside] = np.nan
-        of_kernels[name] = (("band", *_GRID), values, cf_attributes(name))
+        beside[name] = (("band", *_GRID), values, cf_attributes(name))
     return xr.Dataset(
         {
             "surface_albedo": (("band", *_GRID), albedo, albedo_attributes),
-            "albedo_quality": (("band", *_GRID), worst, quality_attributes),
-            **of_kernels,
+            **beside,
         },
         coords={"band": list(bands), **coordinates},
         attrs={key: file.attrs[key] for key in ("title", "source") if key in file.attrs},
@@ -180,16 +180,13 @@ def read_mcd43a1(
 def _read(
     file: xr.Dataset, names: tuple[str, ...], path: FilePath, times: np.ndarray | None = None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict, int]:
-    """Kernel weights and quality of MODIS bands, coordinates, and how many weights are invalid.
+    """Kernel weights of MODIS bands, quality of those that have it, coordinates, and how many
+    weights are invalid.
 
     Of the dates that `times` have, in the order of the file, or of all.
     """
-    require_variables(
-        file,
-        ["time", "lat", "lon", *(_QUALITY + name for name in names)],
-        path,
-        "request the area from AppEEARS in NetCDF format, with its quality layers",
-    )
+    advice = "request the area from AppEEARS in NetCDF format"
+    require_variables(file, ["time", "lat", "lon"], path, advice)
     coordinates: dict = {name: _axis(file, name, path) for name in ("lat", "lon")}
     dates = _times(file, path)
     if times is not None:
@@ -199,7 +196,8 @@ def _read(
     weights, quality, num_invalid = {}, {}, 0
     for name in names:
         weights[name], invalid = _kernel_weights(file, name, path)
-        quality[name] = _quality(file, name, path)
+        if _QUALITY + name in file:
+            quality[name] = _quality(file, name, path)
         num_invalid += invalid
     return weights, quality, coordinates, num_invalid
 

@@ -72,8 +72,9 @@ def read_albedo(path):
     for name in ("volume_kernel_weight", "geometric_kernel_weight"):
         yield Read(name, albedo[name].values, Range(-40.0, 40.0), missing=True)
     for dataset in (albedo, of_modis):
-        quality = dataset["albedo_quality"].values
-        yield Read("albedo_quality", np.isin(quality, (0, 1, 255)), Range(1, 1))
+        if "albedo_quality" in dataset:  # files need not have it
+            quality = dataset["albedo_quality"].values
+            yield Read("albedo_quality", np.isin(quality, (0, 1, 255)), Range(1, 1))
         yield Read("lat", dataset["lat"].values, Range(-90, 90))
 
 

@@ -79,6 +79,20 @@ def test_quality_is_the_worst_of_the_bands_in_use(write_albedo_twin):
     np.testing.assert_array_equal(flags[0, 0, 0], [0, 1, 255])
 
 
+def test_quality_is_not_needed(write_albedo_twin):
+    """As albedo of any quality is taken; of bands of which some lack theirs none is told."""
+    path = write_albedo_twin({b: BANDS[b] for b in ("Band3", "Band6", "Band7")})
+    with_quality = read_mcd43a1(path, ["C01", "C06"])
+    with netCDF4.Dataset(path, "a") as file:
+        name = "BRDF_Albedo_Band_Mandatory_Quality_Band7"
+        file.renameVariable(name, f"not_{name}")
+    without = read_mcd43a1(path, ["C01", "C06"])
+    assert without.identical(with_quality.drop_vars("albedo_quality"))
+    assert "albedo_quality" in read_mcd43a1(path, ["C01"])
+    assert "albedo_quality" in read_white_sky(path, ["Band6"])
+    assert "albedo_quality" not in read_white_sky(path, ["Band6", "Band7"])
+
+
 def test_albedo_outside_0_to_1_is_made_nan_and_counted(write_albedo_twin):
     packed = weights(300)
     packed[0, 0, 0] = [10, 0, 100]  # -0.128
