@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 
 from .atmosphere import State
 from .bands import AnyName, SomeBand, by_band, entry, several_bands
+from .geometry import is_up
 from .lambertian import Lambertian
 from .optics import column_optics, num_terms
 from .planck import in_band_radiance
@@ -226,7 +227,7 @@ def _plain(ground: Any) -> Any:
 
 def above_horizon(zenith: Float[Array, "*n"]) -> Float[Array, "*n"]:
     """Zenith angle, or a harmless constant where it is at or below the horizon. [rad]"""
-    return jnp.where(jnp.cos(zenith) > 0, zenith, zenith.dtype.type(HARMLESS_ZENITH))
+    return jnp.where(is_up(zenith), zenith, zenith.dtype.type(HARMLESS_ZENITH))
 
 
 def _emission(state: State, irradiance: Any, band: SomeBand, satellite: str) -> dict[str, Array]:

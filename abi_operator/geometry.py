@@ -1,8 +1,33 @@
 """Where the sun and the satellite stand, seen from a column."""
 
+import math
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+HORIZON = math.pi / 2
+"""Zenith angle of the horizon, which counts as below it. [rad]"""
+
+
+def is_up(zenith: Any) -> Any:
+    """Whether what stands at a zenith angle is above the horizon; false of what is no number.
+
+    By the angle and not by its cosine, which of the double nearest to pi/2 is 6e-17 and not 0.
+
+    Parameters
+    ----------
+    zenith
+        Angles from the local vertical, of NumPy or JAX, ``*batch``. [rad]
+    """
+    return zenith < HORIZON
+
+
+def _cosine(zenith: Array) -> Array:
+    """Above 0 where and only where it is up."""
+    cosine = jnp.cos(zenith)
+    return jnp.where(is_up(zenith), cosine, jnp.minimum(cosine, 0))
 
 
 class Geometry(eqx.Module):
@@ -33,10 +58,10 @@ class Geometry(eqx.Module):
 
     @property
     def mu0(self) -> Float[Array, "*batch"]:
-        """Cosine of the solar zenith angle. [-]"""
-        return jnp.cos(self.solar_zenith)
+        """Cosine of the solar zenith angle, above 0 where the sun `is_up`. [-]"""
+        return _cosine(self.solar_zenith)
 
     @property
     def mu(self) -> Float[Array, "*batch"]:
-        """Cosine of the view zenith angle. [-]"""
-        return jnp.cos(self.view_zenith)
+        """Cosine of the view zenith angle, above 0 where the satellite `is_up`. [-]"""
+        return _cosine(self.view_zenith)

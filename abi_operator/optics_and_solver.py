@@ -19,6 +19,7 @@ from jaxtyping import Array, Float
 
 from .band_columns import HARMLESS_ZENITH, columns_of_bands
 from .bands_of_states import Inputs, Options, of_tile, tile_size, with_slopes
+from .geometry import is_up
 from .machine.door import Leaves, enter
 from .machine.sizes import chunks_of_states, chunks_to_read
 from .plume_edges import with_plume_edges
@@ -64,7 +65,7 @@ class _Program(NamedTuple):
         if angles[0].size == 0:
             return self._doubling(0)
         depths = enter(_Depths(self.structure, self.options, self.own_axes), leaves)
-        steepest = (np.max(np.where(np.cos(x) > 0, x, HARMLESS_ZENITH)) for x in angles)
+        steepest = (np.max(np.where(is_up(x), x, HARMLESS_ZENITH)) for x in angles)
         cosine = max(float(np.cos(max(steepest))), float(np.finfo(np.float32).eps))
         depths = np.asarray(depths)  # columns that are not finite are NaN, however they are solved
         thickest = float(np.max(depths, where=np.isfinite(depths), initial=0))

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float, UInt8
 from .atmosphere import State
 from .band_columns import above_horizon, ground_of
 from .bands import BANDS, GRASSO2013
+from .geometry import is_up
 from .machine.batching import map_tiles
 from .machine.sizes import tile_of_grounds
 from .nomenclature import GRAZING_ZENITH, LARGEST_SHARE_OUTSIDE, QUALITY_FLAGS
@@ -94,8 +95,9 @@ def flags_from(
     numbers
         `numpy`, or `jax.numpy` of arrays that are traced.
     """
-    grazing, horizon = np.deg2rad(GRAZING_ZENITH).item(), np.deg2rad(90.0).item()
-    night, away = solar_zenith >= horizon, view_zenith >= horizon
+    grazing = np.deg2rad(GRAZING_ZENITH).item()
+    # A sun that is nowhere is not below the horizon.
+    night, away = (~is_up(x) & ~numbers.isnan(x) for x in (solar_zenith, view_zenith))
     holds = {
         "grazing_sun": (solar_zenith > grazing) & ~night,
         "night": night,
@@ -113,7 +115,7 @@ def flags_from(
 @partial(jax.jit, static_argnums=1)
 def _flags(state: State, bands: tuple[str, ...]) -> Array:
     sun, view = state.geometry.solar_zenith, state.geometry.view_zenith
-    by_day, mu0 = jnp.cos(sun) > 0, jnp.cos(above_horizon(sun))
+    by_day, mu0 = is_up(sun), jnp.cos(above_horizon(sun))
     found: dict[str, Array] = {}
     for band in bands:
         ground = ground_of(state, band)

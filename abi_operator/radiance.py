@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 from ._keywords import with_keywords
 from .atmosphere import State
 from .bands import GRASSO2013
+from .geometry import is_up
 from .optics_and_solver import Inputs, Options, solve
 from .planck import brightness_temperature as temperature_of
 from .satellites import solar_irradiance
@@ -96,7 +97,7 @@ def radiance(
     found = solve(Inputs(state, {x: sun[x] for x in emitting}), options)
     factor = [jnp.ones_like(mu0) if x in emitting else of_white_ground(mu0, sun[x]) for x in bands]
     # A sun that is nowhere is not below the horizon.
-    seen = (jnp.cos(state.geometry.view_zenith) > 0) & ~jnp.isnan(mu0)
+    seen = is_up(state.geometry.view_zenith) & ~jnp.isnan(mu0)
     return jnp.where(seen[..., None], found * jnp.stack(factor, axis=-1), jnp.nan)
 
 

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 from ._keywords import with_keywords
 from .atmosphere import State
 from .bands import GRASSO2013
+from .geometry import is_up
 from .optics_and_solver import Inputs, Options, solve
 from .settings import ByName, Settings, settings_of
 from .state_checks import check_state, checked_bands, is_concrete, uniform
@@ -95,15 +96,15 @@ def with_the_suns_cosine(
     solar_zenith, view_zenith
         Zenith angles of sun and satellite. [rad]
     """
-    mu0, mu = (jnp.cos(jnp.asarray(x, value.dtype))[..., None] for x in (solar_zenith, view_zenith))
+    sun, view = (jnp.asarray(x, value.dtype)[..., None] for x in (solar_zenith, view_zenith))
     # Where brf is NaN its derivative in mu0 would be too.
-    lit = (mu0 > 0) & (mu > 0)
-    by_day = jnp.where(lit, mu0, 0) * jnp.where(lit, value, 0)
-    return jnp.where((mu > 0) & ~jnp.isnan(mu0), by_day, jnp.nan)
+    lit = is_up(sun) & is_up(view)
+    by_day = jnp.where(lit, jnp.cos(sun), 0) * jnp.where(lit, value, 0)
+    return jnp.where(is_up(view) & ~jnp.isnan(sun), by_day, jnp.nan)
 
 
 @jax.jit
 def _lit(value: Array, solar_zenith: Array, view_zenith: Array) -> Array:
     """`value` where the sun is up and the satellite in sight, else NaN."""
-    up = (jnp.cos(solar_zenith) > 0) & (jnp.cos(view_zenith) > 0)
+    up = is_up(solar_zenith) & is_up(view_zenith)
     return jnp.where(up[..., None], value, jnp.nan)

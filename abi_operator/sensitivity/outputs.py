@@ -104,7 +104,7 @@ def _brf_with_emission(
     NaN, with derivative 0, where the sun is down.
     """
     seen = radiance(states, bands, sun_distance=sun_distance, **settings._asdict())
-    mu0 = jnp.cos(jnp.asarray(states.geometry.solar_zenith))
+    mu0 = states.geometry.mu0
     found = {}
     for k, (band, sun) in enumerate(sunlight(mu0, bands, settings.satellite, sun_distance).items()):
         white = of_white_ground(mu0, sun)

