@@ -32,7 +32,7 @@ _ANGLES = {
 # What a scenario may have.
 _OPTIONAL = {name: WEATHER[name] for name in ("temperature", "surface_temperature")}
 _OPTIONAL |= {name: STATE[name] for name in _OF_GASES}
-_OPTIONAL |= {"fire_fraction": STATE["fraction"], "water_share": STATE["fraction"]}
+_OPTIONAL |= {"fire_fraction": STATE["fraction"], "water_share": STATE["water_share"]}
 _OPTIONAL |= {"wind_speed": WEATHER["wind_speed"]}
 _OPTIONAL |= dict.fromkeys(("volume_kernel_weight", "geometric_kernel_weight"), FINITE)
 

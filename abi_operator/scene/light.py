@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..atmosphere import Fire, State
+from ..geometry import is_up
 from ..machine.listening import Listener, listening
 from ..nomenclature import QUALITY_FLAGS
 from ..planck import brightness_temperature
@@ -92,7 +93,7 @@ def light(
         if band not in THERMAL:
             factor = fields["radiance"][shines, k] / irradiance[k]
             fields["reflectance_factor"][shines, k] = factor
-            day = mu0[shines] > 0
+            day = np.asarray(is_up(states.geometry.solar_zenith))[shines]
             fields["brf"][shines, k] = np.where(day, factor / np.where(day, mu0[shines], 1), np.nan)
     if "C07" in bands:
         seen = jnp.asarray(fields["radiance"][:, bands.index("C07")])

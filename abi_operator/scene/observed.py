@@ -15,6 +15,7 @@ import xarray as xr
 from ..bands import BANDS
 from ..files import InputError
 from ..files.netcdf import cf_attributes
+from ..geometry import is_up
 from ..instrument import Imager, observe_mean
 from ..radiance import THERMAL
 from .angles import sun_distance
@@ -113,8 +114,8 @@ def _reported(
                 found["reflectance_factor"][t, b] = report.reflectance_factor
             if report.brightness_temperature is not None:
                 found["temperature"][t, b] = report.brightness_temperature
-    sun = np.cos(np.radians(seen["solar_zenith_angle"].values)).reshape(-1, 1, *shape[2:])
-    brf = found["reflectance_factor"] / np.where(sun > 0, sun, np.nan)
+    sun = np.radians(seen["solar_zenith_angle"].values).reshape(-1, 1, *shape[2:])
+    brf = found["reflectance_factor"] / np.where(is_up(sun), np.cos(sun), np.nan)
 
     def variable(name: str, x: np.ndarray) -> xr.DataArray:
         values = x.reshape(radiance.shape)

@@ -148,6 +148,7 @@ def climb_warm(
     stack, quotient = minus_and_quotient(base, h, total, middle, total, loads)
     stack = Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
     if absorption is not None:
+        assert ones is not None
         ones = of_stack(absorption.stack, ones, h, quotient)
         stack = absorbing(stack, ones, absorption.mean)
     column, response = None, None
