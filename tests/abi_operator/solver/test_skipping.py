@@ -302,6 +302,7 @@ def modes_that_count(last_moment, shares):
     one = jnp.ones((1, 1))
     moments = 0 * one[None], (2 * STREAMS - 1) * last_moment * one[None]
     moments = tuple(jnp.repeat(x, STREAMS // 2, axis=1) for x in moments)
+    moments = moments[0].at[:, 0].set(1), moments[1]  # all is scattered
     layers = LayersOfModes(one, 0 * one, one, moments)
     known = Expected(one, one[0], one[0], 1e9 * one[0], one[0])
     plan = planned(layers, one, known, 1e-3, None)
