@@ -86,7 +86,7 @@ def test_what_absorbs_nothing_emits_nothing():
     assert (np.abs(several - exact[:, None]) / strongest[:, None]).max() < ROUNDED
     of_levels = [x["planck_levels"] * given["planck_levels"] for x in (slopes, exact_slopes)]
     assert (np.abs(of_levels[0] - of_levels[1]).max(axis=1) / strongest).max() < ROUNDED
-    # Light that a little absorption would emit has come through layers of 1e3: depth times rounding.
+    # What little absorption would emit comes through layers of 1e3: depth times rounding.
     wrong = np.abs(slopes["ssa"] - exact_slopes["ssa"]).max(axis=1)
     assert (wrong / np.abs(exact_slopes["ssa"]).max(axis=1)).max() < 1e-2
 
