@@ -114,13 +114,8 @@ def slopes_of_mode(
         a, p = layer.matrices(order.mean, kernels, view_secant[None], single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
         warmth = None if column is None else Warmth(column, read(jumps, number))
-        absorption = None
-        if ones is not None:
-            of_layer = absorbed(layer.coalbedo, layer.secants(view_secant[None]), num_nodes)
-            absorption = Absorption(ones, of_layer, order.mean)
-        stack, light, new, room = climb_warm(
-            stack, warmth, absorption, a, p, layer.tau, own, room, keep
-        )
+        kept = _absorption(ones, layer, view_secant, num_nodes, order)
+        stack, light, new, room = climb_warm(stack, warmth, kept, a, p, layer.tau, own, room, keep)
         return stack, light, keeper.with_layer(room, new, number)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
@@ -172,6 +167,16 @@ def _absorbed_by(ground: Bordered, column: Vector | None) -> Vector | None:
     nodes = isotropic_nodes(ground.core)[:, 0]
     nodes = jnp.broadcast_to(nodes, ground.border[:, 0].shape)
     return ground @ Vector(nodes, jnp.ones_like(ground.diagonal))
+
+
+def _absorption(
+    ones: Vector | None, layer: Layer, view_secant: Array, num_nodes: int, order: Order
+) -> Absorption | None:
+    """What a layer and the stack below it absorb, where that is kept."""
+    if ones is None:
+        return None
+    of_layer = absorbed(layer.coalbedo, layer.secants(view_secant[None]), num_nodes)
+    return Absorption(ones, of_layer, order.mean)
 
 
 def _read(
