@@ -89,7 +89,8 @@ def common_type(leaves: Sequence[Any], labels: Callable[[], Sequence[str]]) -> n
     """Floating type that numbers and arrays have in common.
 
     What has no type of its own follows the others: truth values, and Python's numbers, also where a
-    transformation of JAX has made arrays of them.
+    transformation of JAX has made arrays of them. It is float32 at least: of float16 a solution
+    would have neither digits nor range left.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ def common_type(leaves: Sequence[Any], labels: Callable[[], Sequence[str]]) -> n
             )
     own = [a.dtype for x, a in zip(leaves, arrays, strict=True) if not _is_weak(x, a)]
     types = own or [x.dtype for x in arrays]
-    return jax.dtypes.canonicalize_dtype(np.result_type(np.float16, *types))
+    return jax.dtypes.canonicalize_dtype(np.result_type(np.float32, *types))
 
 
 def _is_weak(leaf: Any, array: jax.Array | np.ndarray) -> bool:

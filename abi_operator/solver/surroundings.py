@@ -4,7 +4,7 @@ A plume that is moved, thickened or fitted changes a few layers of a column; air
 cloud and ground below it stay as they are. `surroundings` solves what stays, in all azimuth modes,
 and `Surroundings.brf` puts layers in between: its cost is that of those layers alone, for values
 and slopes. The result is that of `toa_brf` of the whole column, to rounding. What is kept of a
-column (`staying`) are :math:`m (2 n^2 + 4 n + 4)` numbers for m modes and 2n streams and eight
+column (`staying`) are :math:`m (2 n^2 + 4 n + 4)` numbers for m modes and 2n streams and nine
 more, 3.4 kB at 8 streams and 21 kB at 16, whatever number of layers it has.
 
 To solve what stays takes about as long as two solutions of the whole column, and has no derivative:
@@ -17,12 +17,11 @@ from typing import Any, Unpack
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .._keywords import with_keywords
 from .all_modes import twice_reflected_between
-from .column import Column, Options, promoted
+from .column import Column, Options, longest, promoted
 from .door import solve
 from .foreknown import expected_between
 from .method.single_scatter import direct_transmission
@@ -68,8 +67,9 @@ class Surroundings(eqx.Module):
         """Reflectance of the columns with these layers in between, one or more. [-]
 
         Arguments, and errors raised, are those of `toa_brf`. Differentiable (forward and reverse)
-        in every one of them, and in nothing that was solved before. An error budget leaves out what
-        the layers between do not need: it is one of the whole reflectance.
+        in every one of them, and in nothing that was solved before. `num_doublings` and
+        `check_values` of None are those that the surroundings were solved with. An error budget
+        leaves out what the layers between do not need: it is one of the whole reflectance.
         """
         fixed = self.albedo, self.mu0, self.mu, self.relative_azimuth, self.numbers
         albedo, mu0, mu, relative_azimuth, numbers = jax.lax.stop_gradient(fixed)
@@ -85,9 +85,9 @@ class Surroundings(eqx.Module):
             secant=secant,
             around=numbers,
         )
-        how = self.settings._replace(
-            num_doublings=num_doublings, error_budget=error_budget, check_values=check_values
-        )
+        now = {"num_doublings": num_doublings, "check_values": check_values}
+        now = {name: x for name, x in now.items() if x is not None}
+        how = self.settings._replace(error_budget=error_budget, **now)
         return solve(_brf_between, column, how)
 
 
@@ -118,7 +118,7 @@ def surroundings(
     albedo, mu0, mu, relative_azimuth
         As of `toa_brf`, with one view.
     **settings
-        How exactly to solve, then and now: the fields of `Settings`.
+        How exactly to solve, then and now: the fields of `Settings` but the error budget.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def surroundings(
         secant=secant,
     )
     how = Settings(**settings)
-    num_layers = max(np.shape(x)[-1:] or (0,) for x in (column.tau, column.ssa))[0]
+    num_layers = longest(column, how.multiple_views).get("layer", 0)
     if not 0 <= num_above <= num_layers:
         raise ValueError(f"num_above must be 0 to {num_layers}, the layers given; got {num_above}.")
     if how.multiple_views:

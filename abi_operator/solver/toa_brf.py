@@ -42,7 +42,8 @@ def toa_brf(
         Legendre moments of each layer's phase function, chi_0 = 1 (not read), without the factor
         2l + 1: `num_streams` + 1 at least, `num_streams` without delta-M. [-]
     albedo
-        Lambertian albedo of the ground [-], or a `Surface`: anything with its two methods.
+        Lambertian albedo of the ground [-], or a `Surface`: a pytree with its two methods, such as
+        an `equinox.Module`.
     mu0, mu
         Cosines of the solar and view zenith angles, both above 0. At 1, where the derivative in
         the cosine is infinite, the one with the sine held at 0 is returned, so that by a zenith

@@ -135,6 +135,21 @@ def test_a_budget_is_one_of_the_whole_reflectance():
     assert 0 < off.max() < error_budget
 
 
+def test_settings_are_those_of_what_stays():
+    """Unless they are named again: doublings that do not suffice, and values unchecked."""
+    columns = standard_columns()
+    _, changing = parts(columns)
+    how = {"num_doublings": 0, "check_values": False}
+    solved = around(columns, **how, **FEW)
+    thick = 1e2 * changing[0], *changing[1:]
+    few = solved.brf(*thick)
+    np.testing.assert_array_equal(few, solved.brf(*thick, **how))
+    assert np.abs(few - solved.brf(*thick, num_doublings=8)).max() > 1e-5
+    with pytest.raises(ValueError, match="tau"):
+        solved.brf(-thick[0], *thick[1:], check_values=True)
+    solved.brf(-thick[0], *thick[1:])
+
+
 @pytest.mark.float32
 def test_in_single_precision():
     columns = [np.asarray(x, np.float32) for x in standard_columns()]
@@ -163,6 +178,10 @@ def test_what_is_wrong_is_named():
     solved = around(columns)
     with pytest.raises(ValueError, match="num_above must be 0 to 3.*got 4"):
         surroundings(*stay, *columns[3:], num_above=4, **STREAMS)
+    by_secant = {"secant": np.full(stay[0].shape, 1.5)}
+    alike = [np.ones(1), np.ones(1), stay[2][:, :1]]  # for all layers
+    with pytest.raises(ValueError, match="num_above must be 0 to 3.*got 4"):
+        surroundings(*alike, *columns[3:], num_above=4, **by_secant, **STREAMS)
     with pytest.raises(ValueError, match="one view: multiple_views must be False"):
         surroundings(*stay, *columns[3:], num_above=2, multiple_views=True, **STREAMS)
     with pytest.raises(ValueError, match="albedo"):

@@ -235,6 +235,9 @@ def test_other_float_types_are_promoted_together():
     # A Python number follows the arrays.
     found = jax.eval_shape(lambda *x: toa_brf(*x[:3], 0.1, *x[3:], **STANDARD), *single)
     assert found.dtype == jnp.float32
+    half = [np.asarray(x, np.float16) for x in single]
+    found = jax.eval_shape(lambda *x: toa_brf(*x[:3], 0.1, *x[3:], **STANDARD), *half)
+    assert found.dtype == jnp.float32
 
 
 def shared(dtype="float32", **changed):
