@@ -178,9 +178,9 @@ def _stacked(
         if light is None:
             return add_layer(stack, *half_layer(a, p, tau, own), tau), None
         ones = absorbed(layer.coalbedo, layer.secants(view_secant[None]), _num_nodes(lit))
-        y, z, ones = emitting_half_layer(a, p, tau, own, ones)
-        jump = read(jumps, place) * (p @ one)
-        return add_emitting_layer(stack, light, y, z, tau, jump, ones)
+        y, z, kept = emitting_half_layer(a, p, tau, own, ones, one)
+        jump = read(jumps, place)
+        return add_emitting_layer(stack, light, y, z, tau, jump, p @ one, kept)
 
     put_on = one_kernel(put_on, _num_nodes(lit), in_parts=True)
 

@@ -12,10 +12,21 @@ nothing emitted 1e-4 of what a black body does. So single precision carries :mat
 for the start of half a layer, a doubling, and a layer that is put on a stack (`layer`, `adding`).
 All are proportional to the co-albedo, and Y's diagonal and its beams' rows are set by y: Y is wrong
 by what rounding leaves of numbers of order 1, whatever the depth. It is made symmetric as well,
-since what is not would double, too. Double precision goes without.
+since what is not would double, too.
+
+With y light that is emitted is found from what absorbs it alone. As :math:`Z - B^{-1} = hz` with a
+finite z, a layer across which the Planck function increases by D, J = D 1, changes e of `adding` to
+
+.. math::
+   e \leftarrow e + 2D(y + y_e) - h(Y + Y_e)S^{-1}(e + D(2y + y_e + z1)), \qquad
+   z1 = hC1, \qquad z1 \leftarrow (z1 + y)/2
+
+at the start and with a doubling. `adding`'s own way is through :math:`S^{-1}j`, J twice but for
+rounding times the spread of the cosines. Double precision goes without all of this.
 """
 
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +39,21 @@ from .doublings import Doublings, repeated
 from .layer import half_layer
 from .quadrature import half_range
 from .quotient import Quotient, minus_and_quotient, minus_quotient
+
+
+class Absorbed(NamedTuple):
+    """Of half a layer.
+
+    Parameters
+    ----------
+    ones
+        y.
+    lag
+        z 1.
+    """
+
+    ones: Vector
+    lag: Vector
 
 
 def is_kept(dtype: jnp.dtype) -> bool:
@@ -50,15 +76,16 @@ def emitting_half_layer(
     tau: Float[Array, "*batch"],
     doublings: Doublings,
     ones: Vector,
-) -> tuple[Bordered, Bordered, Vector | None]:
-    """`layer.half_layer` of the mean, and ``Y 1`` where it is kept, from ``A 1``."""
+    one: Vector,
+) -> tuple[Bordered, Bordered, Absorbed | None]:
+    """`layer.half_layer` of the mean, and what it absorbs where that is kept, from A 1 and 1."""
     if not is_kept(tau.dtype):
         return *half_layer(a, b_inverse, tau, doublings), None
-    return _half_layer(a, b_inverse, tau, ones, doublings)
+    return _half_layer(a, b_inverse, tau, ones, one, doublings)
 
 
 @jax.custom_jvp
-def _half_layer(a, b_inverse, tau, ones, doublings):
+def _half_layer(a, b_inverse, tau, ones, one, doublings):
     number, step, start = doublings.of_layer()
     h = tau * step
     square = h * h
@@ -67,30 +94,46 @@ def _half_layer(a, b_inverse, tau, ones, doublings):
     impedance = combined([1.0, square], [b_inverse, fraction])
     admittance, quotient = minus_and_quotient([(h, a)], h * square, a, impedance, fraction)
     ones = h * less(ones, square, quotient, ones)
-    carry = absorbing(admittance, ones), impedance, ones, h
-    admittance, impedance, ones, _ = repeated(_doubled, number, carry)
-    return admittance, impedance, ones
+    absorbed = Absorbed(ones, h * (fraction @ one))
+    carry = absorbing(admittance, ones), impedance, absorbed, h
+    admittance, impedance, absorbed, _ = repeated(_doubled, number, carry)
+    return admittance, impedance, absorbed
 
 
 @_half_layer.defjvp
 def _half_layer_jvp(primals, tangents):
     *primals, doublings = primals
     written_out = partial(_half_layer.fun, doublings=doublings.written_out())
-    return jax.jvp(written_out, tuple(primals), tangents[:4])
+    return jax.jvp(written_out, tuple(primals), tangents[:5])
 
 
 def _doubled(_, carry):
-    admittance, impedance, ones, h = carry
+    admittance, impedance, (ones, lag), h = carry
     impedance = combined([1.0, h], [impedance, admittance])
     twice = [(2.0, admittance)]
     admittance, quotient = minus_and_quotient(twice, 2 * h, admittance, impedance, admittance)
+    lag = 0.5 * (lag + ones)
     ones = 2.0 * less(ones, h, quotient, ones)
-    return absorbing(admittance, ones), impedance, ones, 2 * h
+    return absorbing(admittance, ones), impedance, Absorbed(ones, lag), 2 * h
 
 
 def of_stack(below: Vector, layer: Vector, h: Float[Array, "*batch"], quotient: Quotient) -> Vector:
     """y of a stack with a layer on it, from those of both and the quotient of `adding`."""
     return less(below + 2.0 * layer, h, quotient, below + layer)
+
+
+def emitted(
+    column: Vector,
+    planck_jump: Float[Array, "*batch"],
+    below: Vector,
+    layer: Absorbed,
+    h: Float[Array, "*batch"],
+    quotient: Quotient,
+) -> Vector:
+    """e of a stack with a layer on it, from e and y of the stack; see the head of this file."""
+    both = below + layer.ones
+    driving = column + planck_jump * (below + both + layer.lag)
+    return less(column + 2 * planck_jump * both, h, quotient, driving)
 
 
 def less(

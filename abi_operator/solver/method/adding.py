@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import matmul, total
 from ...machine.elimination import inverse, solve
-from .absorption import absorbing, is_kept, of_stack
+from .absorption import Absorbed, absorbing, emitted, is_kept, of_stack
 from .bordered import Bordered, Vector, combined
 from .quotient import Quotient, minus_and_quotient, minus_quotient
 
@@ -90,27 +90,32 @@ def add_emitting_layer(
     admittance: Bordered,
     impedance: Bordered,
     tau: Float[Array, "*batch"],
-    jump: Vector | None,
-    absorbed: Vector | None,
+    planck_jump: Float[Array, "*batch"] | None,
+    b_inverse_one: Vector,
+    absorbed: Absorbed | None,
 ) -> tuple[Bordered, Emission]:
     r"""Put a layer on a stack that emits.
 
     As `add_layer`, and :math:`e \leftarrow e - (Y + Y_e)S^{-1}(he - j)` with the layer's own
-    :math:`j = (B_{bottom} - B_{top}) B^{-1} 1`, None for air that does not emit. `absorbed` is
-    :math:`Y_e 1` where that is kept.
+    :math:`j = (B_{bottom} - B_{top}) B^{-1} 1`, `planck_jump` being None for air that does not
+    emit; where `absorbed` is kept, as stands in `absorption`.
     """
     h, both, middle = _sums(stack, admittance, impedance, tau)
     base = [(1.0, both), (1.0, admittance)]
     added, quotient = minus_and_quotient(base, h, both, middle, both)
-    driving = h * emission.column
-    if jump is not None:
-        driving = driving - jump
-    column = emission.column - quotient.transposed_action(driving)
-    added, kept = _with_own_beams(added), None
+    added, kept, below = _with_own_beams(added), None, emission.absorbed
     if absorbed is not None:
-        assert emission.absorbed is not None
-        kept = of_stack(emission.absorbed, absorbed, h, quotient)
+        assert below is not None
+        kept = of_stack(below, absorbed.ones, h, quotient)
         added = absorbing(added, kept)
+    if planck_jump is not None and absorbed is not None:
+        assert below is not None
+        column = emitted(emission.column, planck_jump, below, absorbed, h, quotient)
+    else:
+        driving = h * emission.column
+        if planck_jump is not None:
+            driving = driving - planck_jump * b_inverse_one
+        column = emission.column - quotient.transposed_action(driving)
     if emission.returned is None:
         return added, Emission(column, None, kept)
     solved = solve(middle.core, [emission.column.nodes[:, None]])[0].joined()[:, 0]

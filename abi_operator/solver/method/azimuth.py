@@ -122,9 +122,9 @@ def emitting_mean(
         (stack, emission), (layer, planck_jump) = carry, x
         a, b_inverse, ones = _mean_of_layer(layer, kernels, directions, single_scattering)
         tau, doublings = layer[0], layer[-1]
-        admittance, impedance, ones = emitting_half_layer(a, b_inverse, tau, doublings, ones)
-        jump = None if planck_jump is None else planck_jump * (b_inverse @ one)
-        return add_emitting_layer(stack, emission, admittance, impedance, tau, jump, ones)
+        *half, kept = emitting_half_layer(a, b_inverse, tau, doublings, ones, one)
+        driven = b_inverse @ one
+        return add_emitting_layer(stack, emission, *half, tau, planck_jump, driven, kept)
 
     xs = (_properties_of_the_mean(layers, directions, doublings), planck_jumps)
     shared = tables.kernels(0), directions, one
