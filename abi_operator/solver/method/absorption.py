@@ -169,6 +169,9 @@ def _absorbing(core, border, diagonal, ones, mean):
     core = 0.5 * (core + jnp.swapaxes(core, 0, 1))
     beams = ones.beams - diagonal - total([s[i] * border[i] for i in number])
     nodes = [ones.nodes[i] - total([s[j] * core[i, j] for j in number]) for i in number]
+    # Where nearly all is absorbed the matrix is the nearer of both: what it leaves is small itself.
+    beams = jnp.clip(1 - ones.beams, 0, 1) * beams
+    nodes = [jnp.clip(1 - ones.nodes[i] / s[i], 0, 1) * nodes[i] for i in number]
     nodes = [mean * x / s[i] for i, x in enumerate(nodes)]
     rows = [[core[i, j] + nodes[i] if i == j else core[i, j] for j in number] for i in number]
     border = jnp.stack([border[i] + share[i] * mean * beams for i in number])
