@@ -36,9 +36,9 @@ from jaxtyping import Array, Float
 from ...machine.algebra import fenced, total
 from .bordered import Bordered, Vector, combined
 from .doublings import Doublings, repeated
-from .layer import half_layer
+from .layer import half_layer, rational_start
 from .quadrature import half_range
-from .quotient import Quotient, minus_and_quotient, minus_quotient
+from .quotient import Quotient, minus_and_quotient
 
 
 class Absorbed(NamedTuple):
@@ -89,9 +89,7 @@ def _half_layer(a, b_inverse, tau, ones, one, doublings):
     number, step, start = doublings.of_layer()
     h = tau * step
     square = h * h
-    inner = combined([5.0, start * square], [b_inverse, a])
-    fraction = minus_quotient([(1 / 3, a)], square / 9, a, inner, a)
-    impedance = combined([1.0, square], [b_inverse, fraction])
+    fraction, impedance = rational_start(a, b_inverse, h, start)
     admittance, quotient = minus_and_quotient([(h, a)], h * square, a, impedance, fraction)
     ones = h * less(ones, square, quotient, ones)
     absorbed = Absorbed(ones, h * (fraction @ one))

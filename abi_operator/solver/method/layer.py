@@ -136,15 +136,22 @@ def half_layer(
     return _half_layer(a, b_inverse, tau, doublings)
 
 
+def rational_start(
+    a: Bordered, b_inverse: Bordered, h: Float[Array, "*batch"], d: float | Float[Array, ""]
+) -> tuple[Bordered, Bordered]:
+    """C and Z of the start of `half_layer`."""
+    square = h * h
+    inner = combined([5.0, d * square], [b_inverse, a])
+    fraction = minus_quotient([(1 / 3, a)], square / 9, a, inner, a)
+    return fraction, combined([1.0, square], [b_inverse, fraction])
+
+
 @jax.custom_jvp
 def _half_layer(a, b_inverse, tau, doublings):
     number, step, start = doublings.of_layer()
     h = tau * step
-    square = h * h
-    inner = combined([5.0, start * square], [b_inverse, a])
-    fraction = minus_quotient([(1 / 3, a)], square / 9, a, inner, a)
-    impedance = combined([1.0, square], [b_inverse, fraction])
-    admittance = minus_quotient([(h, a)], h * square, a, impedance, fraction)
+    fraction, impedance = rational_start(a, b_inverse, h, start)
+    admittance = minus_quotient([(h, a)], h * h * h, a, impedance, fraction)
     admittance, impedance, _ = repeated(_doubled, number, (admittance, impedance, h))
     return admittance, impedance
 
