@@ -54,6 +54,23 @@ class Absorption(NamedTuple):
     layer: Vector
     mean: Float[Array, ""]
 
+    def in_mean(self, function: Callable[..., Any], matrix: Bordered, ones: Vector, *more: Any):
+        """A matrix and its y from `function` of all of these in the mean, else as they are."""
+        given = matrix, ones, *more
+        return jax.lax.cond(
+            self.mean > 0, function, lambda matrix, ones, *_: (matrix, ones), *given
+        )
+
+
+def _doubled(y, ones, h, quotient):
+    ones = 2.0 * less(ones, h, quotient, ones)
+    return absorbing(y, ones), ones
+
+
+def _stacked(stack, ones, below, h, quotient):
+    ones = of_stack(below, ones, h, quotient)
+    return absorbing(stack, ones), ones
+
 
 class Kept(NamedTuple):
     """What the way down needs of a layer but for its doublings; diagonals are formed again.
@@ -120,9 +137,12 @@ def climb_warm(
     y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a, of_ones)
     ones = None
     if absorption is not None:
-        ones = absorption.layer
-        ones = h * (ones - square * through(fraction, z, by_a, ones))
-        y = absorbing(y, ones, absorption.mean)
+
+        def started(y, ones, h, fraction, z, by_a):
+            ones = h * (ones - h * h * through(fraction, z, by_a, ones))
+            return absorbing(y, ones), ones
+
+        y, ones = absorption.in_mean(started, y, absorption.layer, h, fraction, z, by_a)
 
     lag = None if warmth is None else start_of_lag(h, fraction)
 
@@ -133,8 +153,7 @@ def climb_warm(
         right = feed(y)
         y, quotient = minus_and_quotient([(2.0, y)], 2 * h, y, z, y)
         if absorption is not None:
-            ones = 2.0 * less(ones, h, quotient, ones)
-            y = absorbing(y, ones, absorption.mean)
+            y, ones = absorption.in_mean(_doubled, y, ones, h, quotient)
         return y, z, lag, ones, 2 * h, keep(room, Doubled(_part(quotient), right), k)
 
     if doublings.most:
@@ -149,8 +168,8 @@ def climb_warm(
     stack = Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
     if absorption is not None:
         assert ones is not None
-        ones = of_stack(absorption.stack, ones, h, quotient)
-        stack = absorbing(stack, ones, absorption.mean)
+        below = absorption.stack
+        stack, ones = absorption.in_mean(_stacked, stack, ones, below, h, quotient)
     column, response = None, None
     if loaded is not None:
         column, response = respond(loaded, total, middle, h, quotient)

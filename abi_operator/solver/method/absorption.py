@@ -152,14 +152,14 @@ def _beams(beams, border, over, nodes):
     return (beams - total(border * nodes[:, None])) * over
 
 
-def absorbing(matrix: Bordered, ones: Vector, mean: Float[Array, ""] | float = 1.0) -> Bordered:
-    """The same matrix with ``matrix 1 = ones``, as it is but for rounding; in the mean alone."""
-    core, border = _absorbing(matrix.core, matrix.border, matrix.diagonal, ones, mean)
+def absorbing(matrix: Bordered, ones: Vector) -> Bordered:
+    """The same matrix with ``matrix 1 = ones``, as it is but for rounding."""
+    core, border = _absorbing(matrix.core, matrix.border, matrix.diagonal, ones)
     return Bordered(core, border, matrix.diagonal, matrix.corner)
 
 
 @fenced
-def _absorbing(core, border, diagonal, ones, mean):
+def _absorbing(core, border, diagonal, ones):
     mu, weight = half_range(2 * core.shape[0])
     s = np.sqrt(weight * mu).tolist()
     share = (np.sqrt(weight * mu) / np.sum(weight * mu)).tolist()
@@ -170,7 +170,7 @@ def _absorbing(core, border, diagonal, ones, mean):
     # Where nearly all is absorbed the matrix is the nearer of both: what it leaves is small itself.
     beams = jnp.clip(1 - ones.beams, 0, 1) * beams
     nodes = [jnp.clip(1 - ones.nodes[i] / s[i], 0, 1) * nodes[i] for i in number]
-    nodes = [mean * x / s[i] for i, x in enumerate(nodes)]
+    nodes = [x / s[i] for i, x in enumerate(nodes)]
     rows = [[core[i, j] + nodes[i] if i == j else core[i, j] for j in number] for i in number]
-    border = jnp.stack([border[i] + share[i] * mean * beams for i in number])
+    border = jnp.stack([border[i] + share[i] * beams for i in number])
     return jnp.stack([jnp.stack(row) for row in rows]), border
