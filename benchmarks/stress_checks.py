@@ -27,8 +27,10 @@ JIT_UP_TO = 16  # streams: compiling more of them twice takes longer than all th
 # quotient is always that of double precision.
 STEP = 1e-5
 # Single precision is right for so much conservative scattering, by which is meant this co-albedo
-# (README, Limits); columns with more are counted, and not judged.
-CONSERVATIVE, MOST_CONSERVATIVE = 1e-5, 1e3
+# (README, Limits); columns with more are counted, and not judged. Nor are slopes of so much more,
+# which are sums of terms as many times as large (`method.rounding`).
+CONSERVATIVE, MOST_CONSERVATIVE, MOST_OF_SLOPES = 1e-5, 1e5, 1e3
+OF_SLOPES = ("jvp and vjp", "slopes inside jit", "float32 slope", "float32 partial")
 
 CHECKS = {
     "finite value": "a value that is not finite",
@@ -147,14 +149,16 @@ class Judged:
             beyond = self.beyond(self.columns["ssa"])
             for found in self.errors.values():
                 found[beyond] = np.nan
+            for name in OF_SLOPES:
+                self.errors[name][self.beyond(self.columns["ssa"], MOST_OF_SLOPES)] = np.nan
             if not self.emitting:
                 self.errors["energy"][self.beyond(np.ones_like(self.columns["ssa"]))] = np.nan
         return self.errors
 
-    def beyond(self, ssa):
+    def beyond(self, ssa, most=MOST_CONSERVATIVE):
         """Columns with more conservative scattering than single precision is for."""
         tau = np.where(1 - ssa < CONSERVATIVE, self.columns["tau"], 0).sum(axis=1)
-        return self.single & (tau > MOST_CONSERVATIVE)
+        return self.single & (tau > most)
 
     def _errors(self, name, found):
         self.errors[name] = np.where(np.isnan(found), np.inf, found)

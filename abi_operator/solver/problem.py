@@ -22,15 +22,15 @@ from .method.delta_m import ScaledLayers, unscaled
 from .method.delta_m import delta_m as scale_delta_m
 from .method.doublings import layer_doublings, within_reach
 from .method.ground import isotropic
-from .method.rounding import within_single_precision
+from .method.rounding import DEEPEST, within_single_precision
 from .method.single_scatter import direct_transmission, exact_single_scattering
 from .method.surface import AnySurface
 
 
 class Problem:
-    """What all modes share."""
+    """What all modes share; `deepest` is how deep single precision goes (`method.rounding`)."""
 
-    def __init__(self, column: Column, options: Options):
+    def __init__(self, column: Column, options: Options, deepest: float = DEEPEST):
         num_streams = options.num_streams
         scale = scale_delta_m if options.delta_m else unscaled
         self.column, self.options = column, options
@@ -51,7 +51,7 @@ class Problem:
             tau = self.layers.tau * within_reach(self.layers.tau, *limits)
             self.layers = self.layers._replace(tau=tau)
         if self.layers.tau.dtype == jnp.float32:
-            factor = within_single_precision(self.layers.tau, self.layers.coalbedo)
+            factor = within_single_precision(self.layers.tau, self.layers.coalbedo, deepest)
             self.layers = self.layers._replace(tau=self.layers.tau * factor)
         self.doublings = layer_doublings(
             self.layers.tau, secants, num_streams, options.num_doublings

@@ -25,6 +25,7 @@ from .method.doublings import Doublings
 from .method.ground import black
 from .method.layer import ModeKernels, half_layer
 from .method.mode_layers import Layers, Order, read
+from .method.rounding import DEEPEST_THAT_STAYS
 from .method.single_scatter import direct_transmission
 from .method.surface import AnySurface
 from .problem import Problem, seen_at_once
@@ -97,9 +98,9 @@ class Kept(NamedTuple):
         upper = lower = None
         if num_above > 0:
             over_black = tile._replace(albedo=jnp.zeros_like(tile.mu0))
-            upper = Problem(_some_layers(over_black, slice(num_above)), options)
+            upper = Problem(_some_layers(over_black, slice(num_above)), options, DEEPEST_THAT_STAYS)
         if num_above < num_layers:
-            lower = Problem(_some_layers(tile, slice(num_above, None)), options)
+            lower = Problem(_some_layers(tile, slice(num_above, None)), options, DEEPEST_THAT_STAYS)
         return _packed(_parts(tile, upper, lower, options))
 
 

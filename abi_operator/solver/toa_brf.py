@@ -65,7 +65,7 @@ def toa_brf(
     -------
     Reflectance, in the arguments' common floating type (float32 if x64 is disabled). In float32 it
     is NaN, with its slopes, where layers that absorb less than 1e-5 of what they scatter are deeper
-    than 1e4 together, as they are solved; at 1e3 it is right to 5e-4 (`method.rounding`). [-]
+    than 1e6 together, as they are solved; at 1e5 it is right to 1e-3 (`method.rounding`). [-]
 
     Raises
     ------

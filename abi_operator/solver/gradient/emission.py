@@ -19,7 +19,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
-from ..method.absorption import absorbed, emitting_half_layer, is_kept
+from ..method.absorption import absorbing_half_layer, of_ground, of_layer
 from ..method.adding import Emission, add_emitting_layer, add_layer, top
 from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
@@ -177,10 +177,13 @@ def _stacked(
         tau = as_deep_as_seen(layer.tau) if rounded and light is None else layer.tau
         if light is None:
             return add_layer(stack, *half_layer(a, p, tau, own), tau), None
-        ones = absorbed(layer.coalbedo, layer.secants(view_secant[None]), _num_nodes(lit))
-        y, z, kept = emitting_half_layer(a, p, tau, own, ones, one)
         jump = read(jumps, place)
-        return add_emitting_layer(stack, light, y, z, tau, jump, p @ one, kept)
+        if light.absorbed is None:
+            half = half_layer(a, p, tau, own)
+            return add_emitting_layer(stack, light, *half, tau, jump, p @ one, None)
+        ones = of_layer(layer.coalbedo, layer.secants(view_secant[None]), _num_nodes(lit))
+        half = absorbing_half_layer(a, p, tau, own, ones, one)
+        return add_emitting_layer(stack, light, *half[:2], tau, jump, p @ one, half[2])
 
     put_on = one_kernel(put_on, _num_nodes(lit), in_parts=True)
 
@@ -202,7 +205,7 @@ def _of_ground(lit: Lit) -> Emission:
     """What the ground emits, with a place for the sun among the beams."""
     nodes, beams = lit.heating.ground.nodes, lit.heating.ground.beams
     column = Vector(nodes, jnp.concatenate([jnp.zeros_like(beams), beams]))
-    return Emission(column, None, lit.ground @ _one(lit) if is_kept(nodes.dtype) else None)
+    return Emission(column, None, of_ground(lit.ground))
 
 
 @partial(radiance.defjvp, symbolic_zeros=True)

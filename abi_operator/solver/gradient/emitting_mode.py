@@ -23,13 +23,13 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, matmul
 from ...machine.kernels import one_kernel
-from ..method.absorption import absorbed, is_kept
+from ..method.absorption import of_ground
 from ..method.adding import top
 from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
 from ..method.mode_layers import Layer, Layers, Order, added_to, read
 from .fields import Fields, pair
-from .layer import Absorption, climb_warm, descend_warm
+from .layer import absorption, climb, descend_warm
 from .mode import Kernels
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 from .room import Keeper, Room
@@ -114,8 +114,8 @@ def slopes_of_mode(
         a, p = layer.matrices(order.mean, kernels, view_secant[None], single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
         warmth = None if column is None else Warmth(column, read(jumps, number))
-        kept = _absorption(ones, layer, view_secant, num_nodes, order)
-        stack, light, new, room = climb_warm(stack, warmth, kept, a, p, layer.tau, own, room, keep)
+        kept = absorption(ones, layer, view_secant, order)
+        stack, light, new, room = climb(stack, warmth, kept, a, p, layer.tau, own, room, keep)
         return stack, light, keeper.with_layer(room, new, number)
 
     put_one = compiled(put_on_and_keep, in_parts=True)
@@ -123,7 +123,7 @@ def slopes_of_mode(
     def up(below, number):
         return put_one(below, air, jumps, doublings, number, order, kernels), None
 
-    below = ground, (column, _absorbed_by(ground, column)), room
+    below = ground, (column, of_ground(ground)), room
     (stack, (column, _), room), _ = jax.lax.scan(up, below, numbers, reverse=True)
     answers, fields = at_the_top(stack, column)
 
@@ -156,27 +156,8 @@ def slopes_of_mode(
     nothing = jnp.zeros_like(kernels[0].beams), jnp.zeros_like(kernels[1].beams)
     above = fields, nothing, slopes, jax.tree.map(jnp.zeros_like, jumps)
     (at_bottom, beams, slopes, of_jumps), _ = jax.lax.scan(down, above, numbers)
-    of_ground, of_column = pair(1.0, [at_bottom]), _slope_of_column(at_bottom)
-    return answers, fields, room, Slopes(slopes, beams, of_ground, of_column, of_jumps)
-
-
-def _absorbed_by(ground: Bordered, column: Vector | None) -> Vector | None:
-    """``Y 1`` of the ground, where that is kept."""
-    if column is None or not is_kept(ground.core.dtype):
-        return None
-    nodes = isotropic_nodes(ground.core)[:, 0]
-    nodes = jnp.broadcast_to(nodes, ground.border[:, 0].shape)
-    return ground @ Vector(nodes, jnp.ones_like(ground.diagonal))
-
-
-def _absorption(
-    ones: Vector | None, layer: Layer, view_secant: Array, num_nodes: int, order: Order
-) -> Absorption | None:
-    """What a layer and the stack below it absorb, where that is kept."""
-    if ones is None:
-        return None
-    of_layer = absorbed(layer.coalbedo, layer.secants(view_secant[None]), num_nodes)
-    return Absorption(ones, of_layer, order.mean)
+    at_ground = pair(1.0, [at_bottom]), _slope_of_column(at_bottom)
+    return answers, fields, room, Slopes(slopes, beams, *at_ground, of_jumps)
 
 
 def _read(

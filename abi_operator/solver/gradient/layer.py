@@ -8,9 +8,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel, small_enough
-from ..method.absorption import absorbing, less, of_stack, through
+from ..method.absorption import absorbing, less, of_layer, of_stack, through
 from ..method.bordered import Bordered, Vector, combined
 from ..method.doublings import Doublings, repeated
+from ..method.mode_layers import Layer, Order
 from ..method.quotient import Quotient, minus_and_quotient
 from .beams import Step, next_step, own_beams
 from .fields import Action, Feed, Fields, Heat, act, advance, cotangents, feed
@@ -62,6 +63,16 @@ class Absorption(NamedTuple):
         )
 
 
+def absorption(
+    stack: Vector | None, layer: Layer, view_secant: Float[Array, "*batch"], order: Order
+) -> Absorption | None:
+    """What a layer and the stack below it absorb, where the stack's is kept."""
+    if stack is None:
+        return None
+    own = of_layer(layer.coalbedo, layer.secants(view_secant[None]), layer.even.shape[0])
+    return Absorption(stack, own, order.mean)
+
+
 def _doubled(y, ones, h, quotient):
     ones = 2.0 * less(ones, h, quotient, ones)
     return absorbing(y, ones), ones
@@ -96,23 +107,6 @@ class Doubled(NamedTuple):
 
 def climb(
     stack: Bordered,
-    a: Bordered,
-    p: Bordered,
-    tau: Float[Array, "*batch"],
-    doublings: Doublings,
-    room: Any,
-    keep: Callable[[Any, Doubled, Any], Any],
-) -> tuple[Bordered, Kept, Any]:
-    """Put a layer of A and p = B^-1 on a stack: `method.layer.half_layer` and `adding.add_layer`.
-
-    `keep` gives a room with a doubling in it, the number of which it is told.
-    """
-    stack, _, kept, room = climb_warm(stack, None, None, a, p, tau, doublings, room, keep)
-    return stack, kept, room
-
-
-def climb_warm(
-    stack: Bordered,
     warmth: Warmth | None,
     absorption: Absorption | None,
     a: Bordered,
@@ -122,9 +116,11 @@ def climb_warm(
     room: Any,
     keep: Callable[[Any, Doubled, Any], Any],
 ) -> tuple[Bordered, tuple[Vector | None, Vector | None], Kept, Any]:
-    """`climb` with thermal light (`thermal`), of which e of the stack is given back.
+    """Put a layer of A and p = B^-1 on a stack: `method.layer.half_layer` and `adding.add_layer`.
 
-    So is what the stack absorbs of isotropic light, where that is kept (`method.absorption`).
+    `keep` gives a room with a doubling in it, the number of which it is told. Beside the stack
+    stand e of its thermal light (`thermal`), and what it absorbs of isotropic light, where that is
+    kept (`method.absorption`).
     """
     number, step, start = doublings.of_layer()
     h = tau * step

@@ -37,6 +37,7 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, matmul, total
 from ...machine.kernels import one_kernel
+from ..method.absorption import of_ground
 from ..method.adding import top
 from ..method.around import Above
 from ..method.bordered import Bordered
@@ -46,7 +47,7 @@ from ..method.mode_layers import Layer, Layers, Order, added_to, read
 from ..skipping.plan import Plan, over_layers
 from .fields import Fields, pair
 from .interface import slopes_at_face
-from .layer import climb, descend
+from .layer import absorption, climb, descend
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 from .room import Keeper, Room
 
@@ -148,22 +149,25 @@ def _up(
 ) -> tuple[Bordered, Room]:
     """All layers put on the ground; the room filled with what the way down needs of them."""
 
-    def put_on_and_keep(stack, room, given, number):
-        layer, own = given.layer(number)
-        secant = given.view_secant[None]
-        a, p = layer.matrices(given.order.mean, given.kernels, secant, single_scattering)
+    def put_on_and_keep(below, room, given, number):
+        (stack, ones), (layer, own) = below, given.layer(number)
+        secants = given.view_secant[None]
+        a, p = layer.matrices(given.order.mean, given.kernels, secants, single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
-        stack, new, room = climb(stack, a, p, layer.tau, own, room, keep)
+        kept = absorption(ones, layer, given.view_secant, given.order)
+        stack, (_, ones), new, room = climb(stack, None, kept, a, p, layer.tau, own, room, keep)
         room = keeper.with_layer(room, new, number)
-        return stack, keeper.with_stack(room, stack, number) if keeper.stacks else room
+        return (stack, ones), keeper.with_stack(room, stack, number) if keeper.stacks else room
 
     put_one = given.compiled(put_on_and_keep, in_parts=True)
 
-    def all_layers(ground, room, given):
+    def all_layers(below, room, given):
         step = lambda carry, number: put_one(*carry, given, given.place(number))  # noqa: E731
-        return over_layers(step, (ground, room), given.plan, upwards=True)
+        return over_layers(step, (below, room), given.plan, upwards=True)
 
-    return given.compiled(all_layers, in_parts=True)(ground, room, given)
+    below = ground, of_ground(ground)
+    (stack, _), room = given.compiled(all_layers, in_parts=True)(below, room, given)
+    return stack, room
 
 
 def _down(carry: Any, room: Room, given: _Given, keeper: Keeper, single_scattering: bool) -> Any:

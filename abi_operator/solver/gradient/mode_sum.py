@@ -13,7 +13,8 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
-from ..method.adding import add_layer, top
+from ..method.absorption import absorbing_half_layer, of_ground, of_layer
+from ..method.adding import add_absorbing_layer, add_layer, top
 from ..method.around import Above
 from ..method.bordered import Bordered
 from ..method.doublings import Doublings
@@ -135,24 +136,30 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
     lowered = in_single_precision if rounded else lambda x: x
 
     def reflection(mean: bool, mode: Mode, inputs: ModeSum, plan: Plan) -> Array:
-        def put_on(stack, layers, doublings, odd, kernels, view_secants, *number):
+        def put_on(below, layers, doublings, odd, kernels, view_secants, *number):
             # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
-            place = number[0] if number else jnp.zeros_like(odd)
+            place, (stack, ones) = number[0] if number else jnp.zeros_like(odd), below
             layer = layers.layer(place, odd)
             a, p = layer.matrices(mean, kernels, view_secants, how.single_scattering)
             own = jax.tree.map(lambda x: read(x, place), doublings)
             tau = as_deep_as_seen(layer.tau) if rounded and not mean else layer.tau
-            return add_layer(stack, *half_layer(a, p, tau, own), tau)
+            if ones is None:
+                return add_layer(stack, *half_layer(a, p, tau, own), tau), None
+            new = of_layer(layer.coalbedo, layer.secants(view_secants), num_nodes)
+            y, z, new = absorbing_half_layer(a, p, tau, own, new)
+            return add_absorbing_layer(stack, ones, y, z, tau, new)
 
         put_on = one_kernel(put_on, num_nodes, in_parts=True, num_beams=num_beams)
 
         def of_all(ground, layers, plan, odd, kernels, view_secants, *above):
             shared = layers, plan.doublings, odd, kernels, view_secants
 
-            def add(stack, number):
-                return put_on(stack, *shared, *([] if number is None else [number]))
+            def add(below, number):
+                return put_on(below, *shared, *([] if number is None else [number]))
 
-            stack = over_layers(add, ground, plan, upwards=True)
+            stack, _ = over_layers(
+                add, (ground, of_ground(ground) if mean else None), plan, upwards=True
+            )
             return above[0].over(stack)[0] if above else top(stack).reflection()
 
         # Of one layer that is the only one XLA would find no use for what tells layers apart, and

@@ -3,16 +3,18 @@ r"""What layers absorb of isotropic light, kept beside their matrices in single 
 With the vector 1 of isotropic light, Y 1 is what a layer or a stack absorbs of it, hence emits.
 Where next to nothing is absorbed it is a difference of numbers of order 1, of which rounding leaves
 a false co-albedo that doubles with every doubling: in single precision layers of 500 that absorb
-nothing emitted 1e-4 of what a black body does. So single precision carries :math:`y = Y1` along,
+nothing emitted 1e-4 of what a black body does, sunlight that layers of 1e3 send back was off by as
+much, and its slopes in what little they absorb by a fiftieth. So single precision carries
+:math:`y = Y1` along,
 
 .. math::
    y = ha - h^3 C Z^{-1} a, \quad a = A1, \qquad y \leftarrow 2(y - hYZ^{-1}y), \qquad
    y \leftarrow y + 2y_e - h(Y + Y_e)S^{-1}(y + y_e)
 
 for the start of half a layer, a doubling, and a layer that is put on a stack (`layer`, `adding`).
-All are proportional to the co-albedo, and Y's diagonal and its beams' rows are set by y: Y is wrong
-by what rounding leaves of numbers of order 1, whatever the depth. It is made symmetric as well,
-since what is not would double, too.
+It is the azimuthal mean's alone. All are proportional to the co-albedo, and Y's diagonal and its
+beams' rows are set by y: Y is wrong by what rounding leaves of numbers of order 1, whatever the
+depth. It is made symmetric as well, since what is not would double, too.
 
 With y light that is emitted is found from what absorbs it alone. As :math:`Z - B^{-1} = hz` with a
 finite z, a layer across which the Planck function increases by D, J = D 1, changes e of `adding` to
@@ -33,10 +35,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced, total
+from ...machine.algebra import Rows, fenced, total, transpose
 from .bordered import Bordered, Vector, combined
 from .doublings import Doublings, repeated
-from .layer import half_layer, rational_start
+from .ground import isotropic
+from .layer import rational_start
 from .quadrature import half_range
 from .quotient import Quotient, minus_and_quotient
 
@@ -49,38 +52,38 @@ class Absorbed(NamedTuple):
     ones
         y.
     lag
-        z 1.
+        z 1; None where nothing is emitted.
     """
 
     ones: Vector
-    lag: Vector
+    lag: Vector | None
 
 
-def is_kept(dtype: jnp.dtype) -> bool:
-    """Whether y is carried along in this precision."""
-    return dtype == jnp.float32
+def of_ground(ground: Bordered) -> Vector | None:
+    """y of the ground in the azimuthal mean; None in precisions that go without it."""
+    if ground.core.dtype != jnp.float32:
+        return None
+    return ground @ isotropic(2 * ground.core.shape[0], jnp.ones_like(ground.diagonal))
 
 
-def absorbed(
+def of_layer(
     coalbedo: Float[Array, "*batch"], secants: Float[Array, "beam *batch"], num_nodes: int
 ) -> Vector:
-    """``A 1`` of the azimuthal mean."""
+    """``A 1`` of a layer in the azimuthal mean."""
     mu, weight = half_range(2 * num_nodes)
     of_nodes = np.sqrt(weight / mu).reshape(-1, *(1,) * coalbedo.ndim)
     return Vector(jnp.asarray(of_nodes, coalbedo.dtype) * coalbedo, coalbedo * secants)
 
 
-def emitting_half_layer(
+def absorbing_half_layer(
     a: Bordered,
     b_inverse: Bordered,
     tau: Float[Array, "*batch"],
     doublings: Doublings,
     ones: Vector,
-    one: Vector,
-) -> tuple[Bordered, Bordered, Absorbed | None]:
-    """`layer.half_layer` of the mean, and what it absorbs where that is kept, from A 1 and 1."""
-    if not is_kept(tau.dtype):
-        return *half_layer(a, b_inverse, tau, doublings), None
+    one: Vector | None = None,
+) -> tuple[Bordered, Bordered, Absorbed]:
+    """`layer.half_layer` of the mean, and what it absorbs, from A 1; its lag from 1 as well."""
     return _half_layer(a, b_inverse, tau, ones, one, doublings)
 
 
@@ -92,7 +95,7 @@ def _half_layer(a, b_inverse, tau, ones, one, doublings):
     fraction, impedance = rational_start(a, b_inverse, h, start)
     admittance, quotient = minus_and_quotient([(h, a)], h * square, a, impedance, fraction)
     ones = h * less(ones, square, quotient, ones)
-    absorbed = Absorbed(ones, h * (fraction @ one))
+    absorbed = Absorbed(ones, None if one is None else h * (fraction @ one))
     carry = absorbing(admittance, ones), impedance, absorbed, h
     admittance, impedance, absorbed, _ = repeated(_doubled, number, carry)
     return admittance, impedance, absorbed
@@ -110,7 +113,7 @@ def _doubled(_, carry):
     impedance = combined([1.0, h], [impedance, admittance])
     twice = [(2.0, admittance)]
     admittance, quotient = minus_and_quotient(twice, 2 * h, admittance, impedance, admittance)
-    lag = 0.5 * (lag + ones)
+    lag = None if lag is None else 0.5 * (lag + ones)
     ones = 2.0 * less(ones, h, quotient, ones)
     return absorbing(admittance, ones), impedance, Absorbed(ones, lag), 2 * h
 
@@ -129,6 +132,7 @@ def emitted(
     quotient: Quotient,
 ) -> Vector:
     """e of a stack with a layer on it, from e and y of the stack; see the head of this file."""
+    assert layer.lag is not None
     both = below + layer.ones
     driving = column + planck_jump * (below + both + layer.lag)
     return less(column + 2 * planck_jump * both, h, quotient, driving)
@@ -138,7 +142,24 @@ def less(
     base: Vector, factor: Float[Array, "*batch"], quotient: Quotient, vector: Vector
 ) -> Vector:
     """``base - factor quotient^T vector``."""
-    return base - factor * quotient.transposed_action(vector)
+    core, border = (_rows(x) for x in (quotient.core, quotient.border))
+    nodes = _less(base.nodes, factor, core, vector.nodes)
+    passed = quotient.ratio, vector.beams
+    return Vector(nodes, _less(base.beams, factor, border, vector.nodes, passed))
+
+
+def _rows(matrix):
+    """As arrays, however many there are of each."""
+    return matrix.blocks if isinstance(matrix, Rows) else (matrix,)
+
+
+@fenced
+def _less(base, factor, blocks, nodes, passed=None):
+    rows = [block[k] for block in blocks for k in range(block.shape[0])]
+    terms = [row * nodes[k] for k, row in enumerate(rows)]
+    if passed is not None:
+        terms.append(passed[0] * passed[1])
+    return base - factor * total(terms)
 
 
 def through(left: Bordered, middle: Bordered, quotient: Quotient, vector: Vector) -> Vector:
@@ -154,23 +175,42 @@ def _beams(beams, border, over, nodes):
 
 def absorbing(matrix: Bordered, ones: Vector) -> Bordered:
     """The same matrix with ``matrix 1 = ones``, as it is but for rounding."""
-    core, border = _absorbing(matrix.core, matrix.border, matrix.diagonal, ones)
-    return Bordered(core, border, matrix.diagonal, matrix.corner)
+    core = _absorbing_core(matrix.core, _missing_at_nodes(matrix.core, ones.nodes))
+    missing = _missing_at_beams(matrix.border, matrix.diagonal, ones.beams)
+    return Bordered(core, _absorbing_border(matrix.border, missing), matrix.diagonal, matrix.corner)
+
+
+# Where nearly all is absorbed the matrix is the nearer of both, since what it leaves is small
+# itself: less of what is missing is made up for.
+@fenced
+def _missing_at_nodes(core, ones):
+    s, expand = _isotropic(core)
+    both = [float(s[j]) * (core[:, j] + core[j]) for j in range(len(s))]
+    own = (1 / s).reshape(expand).astype(core.dtype)
+    return jnp.clip(1 - ones * own, 0, 1) * (ones - 0.5 * total(both)) * own
 
 
 @fenced
-def _absorbing(core, border, diagonal, ones):
-    mu, weight = half_range(2 * core.shape[0])
-    s = np.sqrt(weight * mu).tolist()
-    share = (np.sqrt(weight * mu) / np.sum(weight * mu)).tolist()
-    number = range(len(s))
-    core = 0.5 * (core + jnp.swapaxes(core, 0, 1))
-    beams = ones.beams - diagonal - total([s[i] * border[i] for i in number])
-    nodes = [ones.nodes[i] - total([s[j] * core[i, j] for j in number]) for i in number]
-    # Where nearly all is absorbed the matrix is the nearer of both: what it leaves is small itself.
-    beams = jnp.clip(1 - ones.beams, 0, 1) * beams
-    nodes = [jnp.clip(1 - ones.nodes[i] / s[i], 0, 1) * nodes[i] for i in number]
-    nodes = [x / s[i] for i, x in enumerate(nodes)]
-    rows = [[core[i, j] + nodes[i] if i == j else core[i, j] for j in number] for i in number]
-    border = jnp.stack([border[i] + share[i] * beams for i in number])
-    return jnp.stack([jnp.stack(row) for row in rows]), border
+def _missing_at_beams(border, diagonal, ones):
+    s, _ = _isotropic(border)
+    given = [float(s[i]) * border[i] for i in range(len(s))]
+    return jnp.clip(1 - ones, 0, 1) * (ones - diagonal - total(given))
+
+
+@fenced
+def _absorbing_core(core, missing):
+    one = np.eye(len(missing)).reshape(*core.shape[:2], *(1,) * (missing.ndim - 1))
+    return 0.5 * (core + transpose(core)) + one.astype(core.dtype) * missing[:, None]
+
+
+@fenced
+def _absorbing_border(border, missing):
+    s, expand = _isotropic(border)
+    share = (s / np.sum(s * s)).reshape(*expand[:1], 1, *expand[1:])
+    return border + share.astype(border.dtype) * missing
+
+
+def _isotropic(like):
+    """Nodes of the vector 1, and their shape with a batch."""
+    mu, weight = half_range(2 * like.shape[0])
+    return np.sqrt(weight * mu), (like.shape[0], *(1,) * (like.ndim - 2))

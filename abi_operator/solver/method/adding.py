@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import matmul, total
 from ...machine.elimination import inverse, solve
-from .absorption import Absorbed, absorbing, emitted, is_kept, of_stack
+from .absorption import Absorbed, absorbing, emitted, of_ground, of_stack
 from .bordered import Bordered, Vector, combined
 from .quotient import Quotient, minus_and_quotient, minus_quotient
 
@@ -55,8 +55,7 @@ def emitting_ground(
     """
     reflected = ground @ one
     column = radiance * one + (radiance - 2 * planck) * reflected
-    kept = reflected if is_kept(radiance.dtype) else None
-    return Emission(column, -jnp.ones_like(radiance), kept)
+    return Emission(column, -jnp.ones_like(radiance), of_ground(ground))
 
 
 def add_layer(
@@ -72,6 +71,20 @@ def add_layer(
     h, both, middle = _sums(stack, admittance, impedance, tau)
     base = [(1.0, both), (1.0, admittance)]
     return _with_own_beams(minus_quotient(base, h, both, middle, both))
+
+
+def add_absorbing_layer(
+    stack: Bordered,
+    below: Vector,
+    admittance: Bordered,
+    impedance: Bordered,
+    tau: Float[Array, "*batch"],
+    layer: Absorbed,
+) -> tuple[Bordered, Vector]:
+    """`add_layer` in the mean where what is absorbed is kept (`absorption`), and y of the stack."""
+    stack, quotient = add_layer_and_quotient(stack, admittance, impedance, tau)
+    ones = of_stack(below, layer.ones, 0.5 * tau, quotient)
+    return absorbing(stack, ones), ones
 
 
 def add_layer_and_quotient(

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel
-from .absorption import absorbed, emitting_half_layer
+from .absorption import absorbing_half_layer, of_layer
 from .adding import Emission, Top, add_emitting_layer, add_layer, top
 from .bordered import Bordered, Vector
 from .delta_m import ScaledLayers
@@ -122,9 +122,13 @@ def emitting_mean(
         (stack, emission), (layer, planck_jump) = carry, x
         a, b_inverse, ones = _mean_of_layer(layer, kernels, directions, single_scattering)
         tau, doublings = layer[0], layer[-1]
-        *half, kept = emitting_half_layer(a, b_inverse, tau, doublings, ones, one)
         driven = b_inverse @ one
-        return add_emitting_layer(stack, emission, *half, tau, planck_jump, driven, kept)
+        if emission.absorbed is None:
+            half = half_layer(a, b_inverse, tau, doublings)
+            return add_emitting_layer(stack, emission, *half, tau, planck_jump, driven, None)
+        emits = None if planck_jump is None else one
+        half = absorbing_half_layer(a, b_inverse, tau, doublings, ones, emits)
+        return add_emitting_layer(stack, emission, *half[:2], tau, planck_jump, driven, half[2])
 
     xs = (_properties_of_the_mean(layers, directions, doublings), planck_jumps)
     shared = tables.kernels(0), directions, one
@@ -163,7 +167,7 @@ def _mean_of_layer(
     a = layer_matrix(kernels[0], moments_a, secants, single_scattering)
     a = conservative(a, coalbedo)
     b_inverse = layer_matrix(kernels[1], moments_b, secants, single_scattering).inverse()
-    return a, b_inverse, absorbed(coalbedo, secants, len(kernels[0].nodes))
+    return a, b_inverse, of_layer(coalbedo, secants, len(kernels[0].nodes))
 
 
 def higher_modes(

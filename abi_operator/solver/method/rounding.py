@@ -1,10 +1,13 @@
 """What single precision is enough for.
 
 A stack's admittance falls as one over its depth where nothing is absorbed (`adding`), and is there
-a difference of numbers of order 1. So its relative error is that of rounding times the depth:
-reflectances in single precision are right to 5e-4 at a depth of 1,000, and mean nothing from some
-30,000 on, where the difference has neither a right digit nor a sign. In double precision they are
-right to 1e-9 at 1e7.
+a difference of numbers of order 1, of which single precision has what is absorbed beside it
+(`absorption`). So reflectances in single precision are right to 2e-5 at a depth of 1,000 and to
+1e-3 at 1e5, and mean little from 1e6 on. Slopes in a layer's depth and moments are sums of terms
+as many times as large as it is deep: of the change that doubling the depth makes, rounding leaves
+that many times 1e-8 of the reflectance. Layers that stay (`staying`) go without what is absorbed:
+reflectances over and under them are right to 5e-4 at 1,000, and mean nothing from some 30,000 on.
+In double precision all are right to 1e-9 at 1e7.
 
 That is the azimuthal mean's alone: no other mode keeps energy. Where an error budget allows for it
 (`skipping.budget.SINGLE_FROM`), values have all others in single precision, which holds twice as
@@ -23,7 +26,8 @@ from jaxtyping import Array, Float
 # Co-albedo up to which light is scattered so often that depth counts: where more is absorbed than
 # this, what lies deeper than a few hundred is not seen. [-]
 _CONSERVATIVE = 1e-5
-_DEEPEST = 1e4
+DEEPEST, DEEPEST_THAT_STAYS = 1e6, 1e4
+"""Optical depth of layers that do not absorb that single precision is enough for. [-]"""
 DEEPEST_ASIDE = 1e3
 """Optical depth of a layer that looks like any deeper one in all modes but the mean. [-]"""
 
@@ -31,7 +35,9 @@ Arrays = TypeVar("Arrays")
 
 
 def within_single_precision(
-    tau: Float[Array, "layer *batch"], coalbedo: Float[Array, "layer *batch"]
+    tau: Float[Array, "layer *batch"],
+    coalbedo: Float[Array, "layer *batch"],
+    deepest: float = DEEPEST,
 ) -> Float[Array, "*batch"]:
     """1 where single precision is enough for a column, else NaN: a factor of its optical depths.
 
@@ -39,10 +45,12 @@ def within_single_precision(
     ----------
     tau, coalbedo
         Optical depth and 1 - ssa of the layers as they are solved. [-]
+    deepest
+        Depth of those that do not absorb, together, for which it is. [-]
     """
     deep = jnp.sum(jnp.where(coalbedo < _CONSERVATIVE, tau, jnp.zeros_like(tau)), axis=0)
     number = tau.dtype.type  # which Python's numbers would not have
-    return jnp.where(deep > number(_DEEPEST), number(jnp.nan), number(1))
+    return jnp.where(deep > number(deepest), number(jnp.nan), number(1))
 
 
 def as_deep_as_seen(tau: Float[Array, "layer *batch"]) -> Float[Array, "layer *batch"]:

@@ -232,8 +232,9 @@ def test_room_is_what_a_layer_keeps(num_streams):
     like = jnp.zeros((3, 5))
 
     def climbed(matrix, tau):
-        _, *kept = climb(
-            matrix, matrix, matrix, tau, Doublings(None, 1), None, lambda _, new, k: new
+        light, doublings = (None, None), Doublings(None, 1)
+        _, _, *kept = climb(
+            matrix, *light, matrix, matrix, tau, doublings, None, lambda _, new, k: new
         )
         return [
             jax.tree.map(

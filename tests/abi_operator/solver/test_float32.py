@@ -9,7 +9,7 @@ import pytest
 from columns import hard_columns, simple_columns
 from random_columns import random_columns
 
-from abi_operator.solver import sufficient_doublings, toa_brf
+from abi_operator.solver import sufficient_doublings, toa_albedo, toa_brf
 
 INPUTS = ("tau", "ssa", "moments", "albedo", "mu0", "mu", "relative_azimuth")
 SEED = 19770701
@@ -137,18 +137,43 @@ def conservative_columns(depth, count=64, layers=16, num_streams=4):
 
 
 @pytest.mark.float32
-@pytest.mark.parametrize(("depth", "right"), [(10, 1e-5), (1e3, 5e-4), (3e5, None)])
+@pytest.mark.parametrize(("depth", "right"), [(10, 5e-6), (1e3, 1e-5), (1e5, 1e-4), (3e7, None)])
 def test_depth_without_absorption_is_right_or_refused(depth, right):
-    """The more of it, the more rounding weighs; where it is all, there is no number."""
+    """Rounding hardly weighs more with it; where it is all, there is no number."""
     columns = conservative_columns(depth)
-    single = np.asarray(toa_brf(*columns, num_streams=4, num_doublings=14))
+    single = np.asarray(toa_brf(*columns, num_streams=4))
     assert single.dtype == np.float32
     if right is None:
         assert np.isnan(single).all()
         return
     with jax.enable_x64(True):
-        double = np.asarray(toa_brf(*as_double(columns), num_streams=4, num_doublings=14))
+        double = np.asarray(toa_brf(*as_double(columns), num_streams=4))
     assert np.max(abs(single / double - 1)) < right
+
+
+@pytest.mark.float32
+def test_what_nothing_absorbs_comes_back():
+    """White ground under layers of any depth: all sunlight, as seen by a plane and by views."""
+    tau, ssa, moments, albedo, mu0, *_ = conservative_columns(1e5)
+    share = np.asarray(toa_albedo(tau, ssa, moments, albedo, mu0, num_streams=4))
+    assert share.dtype == np.float32
+    assert np.max(abs(share - 1)) < 2e-6  # 3e-4 and more without what is absorbed
+
+
+@pytest.mark.float32
+@pytest.mark.parametrize(("depth", "right"), [(1e3, 1e-3), (1e5, 5e-2)])
+def test_what_little_absorption_takes_through_deep_layers(depth, right):
+    """Light of many scatterings: its slopes in ssa and albedo, of their largest."""
+    columns = conservative_columns(depth)
+    whole = lambda *x: jnp.sum(toa_brf(*x, num_streams=4))  # noqa: E731
+    derivative = jax.grad(whole, argnums=(1, 3))
+    single = derivative(*columns)
+    with jax.enable_x64(True):
+        double = [np.asarray(x) for x in derivative(*as_double(columns))]
+    for s, d in zip(single, double, strict=True):
+        assert s.dtype == jnp.float32
+        s, d = (np.asarray(x).reshape(len(d), -1) for x in (s, d))
+        assert np.max(abs(s - d).max(axis=1) / abs(d).max(axis=1)) < right
 
 
 @pytest.mark.parametrize("error_budget", [None, 1e-3])
