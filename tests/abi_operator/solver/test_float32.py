@@ -153,15 +153,15 @@ def test_depth_without_absorption_is_right_or_refused(depth, right):
 
 @pytest.mark.float32
 def test_what_nothing_absorbs_comes_back():
-    """White ground under layers of any depth: all sunlight, as seen by a plane and by views."""
+    """White ground under layers of any depth: all sunlight leaves again."""
     tau, ssa, moments, albedo, mu0, *_ = conservative_columns(1e5)
     share = np.asarray(toa_albedo(tau, ssa, moments, albedo, mu0, num_streams=4))
     assert share.dtype == np.float32
-    assert np.max(abs(share - 1)) < 2e-6  # 3e-4 and more without what is absorbed
+    assert np.max(abs(share - 1)) < 2e-6  # some roundings of 6e-8, whatever the depth
 
 
 @pytest.mark.float32
-@pytest.mark.parametrize(("depth", "right"), [(1e3, 1e-3), (1e5, 5e-2)])
+@pytest.mark.parametrize(("depth", "right"), [(1e3, 5e-4), (1e5, 4e-2)])
 def test_what_little_absorption_takes_through_deep_layers(depth, right):
     """Light of many scatterings: its slopes in ssa and albedo, of their largest."""
     columns = conservative_columns(depth)
