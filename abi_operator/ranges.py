@@ -132,6 +132,8 @@ STATE: dict[str, Range] = {
     "albedo": SHARE,
     "water_share": SHARE,
     "wind_speed": _WIND,
+    "water_reflectance": SHARE,
+    "foam_reflectance": SHARE,
     "refractive_index": _REFRACTION,
     "absorption_index": _ABSORPTION,
     "solar_zenith": _ZENITH,

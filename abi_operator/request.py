@@ -126,8 +126,22 @@ def check_effects(request: Request) -> None:
             raise InputError(
                 "broadband albedo (--broadband) is that of an albedo file; name one (--albedo)."
             )
-    elif set(request.bands) == thermal:
+    if set(request.bands) == thermal:
+        _check_thermal_alone(request)
+
+
+def _check_thermal_alone(request: Request) -> None:
+    """Raise `InputError` where the ground of bands of sunlight is told and there are none."""
+    grounds = {
+        "an albedo file (--albedo)": request.albedo,
+        "an albedo of the ocean (--ocean-albedo)": request.ocean_albedo,
+        "a wind over water (--ocean-wind)": request.ocean_wind,
+        "an albedo of land (--land-albedo)": request.land_albedo,
+        "an albedo of sea ice (--sea-ice-albedo)": request.sea_ice_albedo,
+        "an albedo of snow (--snow-albedo)": request.snow_albedo,
+    }
+    for name in (name for name, value in grounds.items() if value is not None):
         raise InputError(
-            f"an albedo file (--albedo) is of bands of sunlight; simulate one beside "
-            f"{', '.join(THERMAL)} (--bands), or leave the file out."
+            f"{name} is of bands of sunlight; simulate one beside {', '.join(THERMAL)} (--bands), "
+            "or leave it out."
         )

@@ -43,6 +43,7 @@ from .scene import (
     CLASSES,
     PlumeSpecification,
     check_absorption,
+    check_aod_550,
     check_background_aerosol,
     check_classes,
     check_cloud_optics,
@@ -193,6 +194,8 @@ def _check_request(request: Request) -> None:
     check_cloud_optics(request.cloud_optics)
     check_ice_optics(request.ice_optics)
     check_background_aerosol(request.background_aerosol)
+    if request.plume_aod is not None:
+        check_aod_550(request.plume_aod, "the plume")
     check_ice_albedo(request.sea_ice_albedo, "sea ice")
     check_ice_albedo(request.snow_albedo, "snow")
     check_effects(request)

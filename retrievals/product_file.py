@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from abi_operator.files import InputError
-from abi_operator.files.netcdf import load_all, open_netcdf
+from abi_operator.files.netcdf import load_all, open_netcdf, require_values
 
 from .declarations import AOD_LIMIT
 from .kinds import KINDS, vector_of
@@ -38,6 +38,7 @@ def read_retrieval(path: str | PathLike[str]) -> xr.Dataset:
     with open_netcdf(path, advice=_ADVICE) as file:
         if "result_code" not in file:
             raise InputError(f"{path} has no result_code; {_ADVICE}.")
+        require_values(file["result_code"], path)
         retrieval = load_all(file, path)
     _check_names(retrieval, path)
     success = retrieval["result_code"].values == ResultCode.SUCCESS

@@ -106,16 +106,30 @@ def require_variables(
 
 
 def require_dims(array: xr.DataArray, dims: tuple[str, ...], path: FilePath) -> None:
-    """Raise `InputError` unless `array` has exactly the dimensions `dims`, in this order."""
+    """Raise `InputError` unless `array` has exactly the dimensions `dims`, in this order, and none
+    of them is empty.
+    """
     if array.dims != dims:
         raise InputError(
             f"{array.name} in {path} has dimensions {array.dims} where {dims} are expected; "
             "give the file as its producer wrote it."
         )
+    require_values(array, path)
+
+
+def require_values(array: xr.DataArray, path: FilePath) -> None:
+    """Raise `InputError` where a dimension of `array` is empty, so that it has no values."""
+    empty = [str(dim) for dim, size in array.sizes.items() if not size]
+    if empty:
+        raise InputError(
+            f"{array.name} in {path} has no values, as {', '.join(empty)} is empty; give the file "
+            "as its producer wrote it."
+        )
 
 
 def load(array: xr.DataArray, path: FilePath) -> np.ndarray:
-    """Read the values of a lazy variable from disk as float64."""
+    """Read the values of a lazy variable, which has some, from disk as float64."""
+    require_values(array, path)
     try:
         return np.asarray(array.values, dtype=np.float64)
     except _UNREADABLE as error:

@@ -257,6 +257,8 @@ def read_result(path: str | PathLike[str]) -> xr.Dataset:
             assert entry is not None
             timed = "time" in dataset[name].dims or name not in _POSITION
             require_dims(dataset[name], ("time", *entry.dims) if timed else entry.dims, path)
+        for name in ("time", "band"):
+            require_dims(dataset[name], (name,), path)
         if dataset["time"].attrs.get("units") != _TIME_UNITS:
             raise InputError(f"time in {path} is not in {_TIME_UNITS}; {_ADVICE}.")
     except InputError:

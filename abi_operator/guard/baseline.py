@@ -13,7 +13,7 @@ import xarray as xr
 from .._version import __version__
 from ..bands import BANDS
 from ..files import InputError, output_folder
-from ..files.netcdf import load_all, open_netcdf
+from ..files.netcdf import load_all, open_netcdf, require_values
 from .comparison import (
     INPUT_TOLERANCE,
     JACOBIAN_TOLERANCE,
@@ -185,7 +185,7 @@ def read_baseline(path: str | PathLike[str]) -> Baseline:
 
 
 def _check_shapes(dataset: xr.Dataset, path: str | PathLike[str]) -> None:
-    """Refuse arrays of other axes or types, names that are there twice, and infinite numbers.
+    """Refuse arrays of other axes or types or of none, names twice, and infinite numbers.
 
     An infinite number would be within its own tolerance of any other.
     """
@@ -199,6 +199,7 @@ def _check_shapes(dataset: xr.Dataset, path: str | PathLike[str]) -> None:
             raise InputError(
                 f"{name} in {path} is {values.dtype} along {dataset[name].dims}; {_ADVICE}."
             )
+        require_values(dataset[name], path)
         if name in _NUMBERS and np.isinf(values).any():
             raise InputError(f"{name} in {path} is infinite somewhere; {_ADVICE}.")
         if dims == (name,) and len(set(map(str, values))) < len(values):

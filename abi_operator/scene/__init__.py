@@ -12,6 +12,7 @@ from .account import add_accounts as add_accounts
 from .account import negative_lines as negative_lines
 from .albedo import check_ground as check_ground
 from .angles import SATELLITE_LONGITUDE as SATELLITE_LONGITUDE
+from .background import check_aod_550 as check_aod_550
 from .background import check_background_aerosol as check_background_aerosol
 from .cloud_optics import check_cloud_optics as check_cloud_optics
 from .cloud_optics import check_ice_optics as check_ice_optics

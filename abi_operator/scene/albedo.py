@@ -5,6 +5,7 @@ import xarray as xr
 
 from ..files import InputError
 from ..radiance import THERMAL
+from ..ranges import SHARE
 from .albedo_file import albedo_of_file, check_extent
 from .emissivity import Emissivity, check_emissivity, thermal_albedo
 from .grounds import FROM_MODEL, OceanWind, check_ocean_wind, limited_wind, sea_albedo
@@ -154,6 +155,8 @@ def check_ground(
         If given, that of water follows from it. [m s-1]
     """
     check_land_albedo(land_albedo)
+    if ocean_albedo is not None and not SHARE.holds(ocean_albedo):
+        raise InputError(f"the albedo of water is {ocean_albedo:g}; it must be {SHARE.words}.")
     if set(bands) & set(THERMAL):
         check_emissivity(emissivity)
     if set(bands) <= set(THERMAL):

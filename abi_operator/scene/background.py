@@ -1,13 +1,12 @@
 """Aerosol beside the plumes as variables of a scenario: the same in all columns."""
 
-import math
-
 import numpy as np
 import xarray as xr
 
 from ..files import InputError
 from ..files.netcdf import cf_attributes
 from ..optics import background_aerosol
+from ..ranges import STATE
 
 QUANTITIES = ("aod_550", "scale_height", "relative_extinction", "ssa", "asymmetry")
 """Fields of `BackgroundAerosol`, as variables behind ``background_``."""
@@ -16,10 +15,17 @@ BY_BAND = ("relative_extinction", "ssa", "asymmetry")
 
 
 def check_background_aerosol(aod_550: float | None) -> None:
-    """Raise `InputError` unless an optical depth is none or a finite number of 0 or more."""
-    if aod_550 is not None and not 0 <= aod_550 < math.inf:
+    """Raise `InputError` unless an optical depth is none or in the range of one."""
+    if aod_550 is not None:
+        check_aod_550(aod_550, "the background aerosol")
+
+
+def check_aod_550(aod_550: float, whose: str) -> None:
+    """Raise `InputError` unless an optical depth at 550 nm is in its range. [-]"""
+    allowed = STATE["aod_550"]
+    if not allowed.holds(aod_550):
         raise InputError(
-            f"the background aerosol has an optical depth of 0 or more; got {aod_550}."
+            f"the optical depth of {whose} is {aod_550:g}; it must be {allowed.words}."
         )
 
 

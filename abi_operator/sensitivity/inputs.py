@@ -8,6 +8,7 @@ names are in `declarations`. A ground that reflects unevenly has leaves that are
 any ground is `ground_albedo.albedo`.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -57,8 +58,8 @@ class Input:
 
     def stepping(self, step: float) -> "Input":
         """The same with another step."""
-        if not step > 0:
-            raise ValueError(f"a step is above 0; got {step} for {self.name}.")
+        if not 0 < step < math.inf:
+            raise ValueError(f"a step is above 0 and finite; got {step} for {self.name}.")
         return replace(self, step=float(step))
 
 

@@ -75,6 +75,10 @@ def covariance_of(
         unknown = [name for name in pair if name not in names]
         if unknown or pair[0] == pair[1]:
             raise ValueError(f"a correlation is of two of {', '.join(names)}; got {pair}.")
+        if not -1 <= correlation <= 1:
+            raise ValueError(
+                f"a correlation is -1 to 1; got {correlation} of {' and '.join(pair)}."
+            )
         i, j = (names.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = correlation
     sigma = np.array([one.step for one in inputs])
@@ -87,6 +91,8 @@ def checked_covariance(covariance: np.ndarray, size: int) -> np.ndarray:
     It is judged by its correlations, which do not hang on the units of the inputs.
     """
     covariance = np.asarray(covariance)
+    if not np.isfinite(covariance).all():
+        raise ValueError(f"the covariance of {size} inputs is finite; got {covariance.tolist()}.")
     square = covariance.shape == (size, size)
     _, correlations = _standardized(covariance) if square else (None, covariance)
     if not square or not np.allclose(correlations, correlations.T):

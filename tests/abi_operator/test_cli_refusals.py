@@ -130,10 +130,22 @@ def test_pictures_of_the_result_before_are_removed_and_others_stay(invoke, tmp_p
         (["--emissivity", "lava"], "(--emissivity) is that of the ground in C07; simulate that"),
         (["--plume-species", "smoke"], "--plume-species is of a plume; name its picture"),
         (["--plume-aod", "2"], "--plume-aod is of a plume; name its picture (--plume)"),
+        (["--plume-aod", "inf"], "the optical depth of the plume is inf; it must be 0 or more"),
+        (["--background-aerosol", "1e7"], "depth of the background aerosol is 1e+07; it must be"),
         (
             ["--bands", "C07", "--emissivity", "0.9", "--albedo", "none.nc"],
             "(--albedo) is of bands of sunlight; simulate one beside C07",
         ),
+        *[
+            (["--bands", "C07", "--emissivity", "0.9", option, value], f"({option}) is of bands of")
+            for option, value in [
+                ("--ocean-albedo", "0.06"),
+                ("--ocean-wind", "5"),
+                ("--land-albedo", "0.2"),
+                ("--sea-ice-albedo", "0.6"),
+                ("--snow-albedo", "0.8"),
+            ]
+        ],
         (["--ocean-wind", "gale"], "no wind is known by the name of 'gale'"),
         (["--fires", "none.csv"], "none.csv does not exist"),
         (["--plume-species", "dust"], "'dust' is not one of"),

@@ -166,6 +166,8 @@ def test_slopes_of_a_column_that_is_no_number_are_its_own_affair():
     [
         (lambda g: g.water_share, 50.0, r"\.water_share of column 1 is 50\.0; allowed is 0 to 1"),
         (lambda g: g.water_share, -0.1, r"\.water_share of column 1 is -0\.1"),
+        (lambda g: g.sea.foam_reflectance, 1.2, r"\.sea\.foam_reflectance of column 1 is 1\.2"),
+        (lambda g: g.sea.water_reflectance, -0.1, r"\.sea\.water_reflectance of column 1 is -0"),
         (lambda g: g.sea.refractive_index, 0.34, r"index of column 1 is 0\.34; allowed is 1 to 10"),
         (lambda g: g.sea.absorption_index, -1e-9, r"\.sea\.absorption_index of column 1 is -1e-09"),
         (lambda g: g.sea.wind_speed, 40.0, r"\.sea\.wind_speed of column 1 is 40\.0"),

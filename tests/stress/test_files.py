@@ -87,6 +87,44 @@ def test_hundreds_of_damaged_files_are_refused_in_words(kind, files, scale):
     assert_in_words(kind, files[kind], 0, max(50, int(scale * 600)))
 
 
+def emptied(path, dimension, target):
+    """A copy of a file of which a dimension is 0 long."""
+    with netCDF4.Dataset(path) as file, netCDF4.Dataset(target, "w") as copy:
+        copy.setncatts({name: file.getncattr(name) for name in file.ncattrs()})
+        for name, dim in file.dimensions.items():
+            copy.createDimension(name, None if name == dimension else dim.size)
+        for name, array in file.variables.items():
+            packed = {x: array.getncattr(x) for x in array.ncattrs()}
+            fill = packed.pop("_FillValue", None)
+            ours = copy.createVariable(name, array.dtype, array.dimensions, fill_value=fill)
+            ours.setncatts(packed)
+            array.set_auto_maskandscale(False)
+            ours.set_auto_maskandscale(False)
+            if dimension not in array.dimensions:
+                ours[...] = array[...]
+    return target
+
+
+@pytest.mark.parametrize("kind", NETCDF)
+def test_files_without_any_value_are_refused_in_words(kind, files):
+    """Whichever dimension is empty: what is read all the same has values, and right ones."""
+    original = files[kind]
+    with netCDF4.Dataset(original) as file:
+        dimensions = list(file.dimensions)
+    refused = []
+    for dimension in dimensions:
+        copy = emptied(original, dimension, original.with_name(f"empty_{dimension}.nc"))
+        try:
+            for read in READERS[kind](copy):
+                assert np.size(read.values) and not read.nonsense, (dimension, read.name)
+        except InputError as error:
+            refused.append(dimension)
+            assert copy.name in str(error), error
+        finally:
+            copy.unlink()
+    assert refused, dimensions
+
+
 def test_numbers_that_are_unpacked_by_words_are_refused(files, tmp_path):
     path = tmp_path / "model.nc"
     path.write_bytes(files["wrf"].read_bytes())

@@ -6,7 +6,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from abi_operator.files import InputError, mcd43, read_mcd43a1, read_white_sky
+from abi_operator.files import InputError, mcd43_layers, read_mcd43a1, read_white_sky
 from abi_operator.surface import MODIS_TO_ABI
 
 FILL = 32767
@@ -138,19 +138,41 @@ def test_times_are_dates_whatever_the_calendar(write_albedo_twin, calendar):
     np.testing.assert_array_equal(time, np.array(["2007-10-15", "2007-10-23"], "datetime64[ns]"))
 
 
+@pytest.mark.parametrize(
+    ("days", "words"),
+    [
+        (np.nan, "time in .* has 1 missing or non-finite values"),
+        (1e18, "time in .* cannot be read as dates"),
+        (-1e4, "time in .* has the year 1972, and MODIS flies since 2000; give"),
+        (-1e7, "time in .* has the year -25380, and MODIS flies since 2000; give"),
+        (1e6, "time in .* has the year 4737, and"),
+    ],
+)
+def test_times_that_are_no_dates_are_refused(write_albedo_twin, days, words):
+    path = write_albedo_twin({"Band3": BANDS["Band3"]})
+    with netCDF4.Dataset(path, "a") as file:
+        attributes = {name: file["time"].getncattr(name) for name in ("units", "calendar")}
+        file.renameVariable("time", "days")
+        time = file.createVariable("time", "f8", ("time",))
+        time.setncatts(attributes)
+        time[:] = [2844, days]
+    with pytest.raises(InputError, match=words):
+        read_mcd43a1(path, ["C01"])
+
+
 def test_only_the_dates_that_a_scene_has_are_read(write_albedo_twin, monkeypatch):
     """A month of dates would be a month's worth of memory."""
     packed = weights(300, shape=(31, 2, 3))
     packed[..., 0] += np.arange(31, dtype=np.int16)[:, None, None]
     path = write_albedo_twin({"Band3": packed})
     whole = read_mcd43a1(path, ["C01"], kernels=True)
-    load, sizes = mcd43.load, []
+    load, sizes = mcd43_layers.load, []
 
     def counted(array, path):
         sizes.append(array.size)
         return load(array, path)
 
-    monkeypatch.setattr(mcd43, "load", counted)
+    monkeypatch.setattr(mcd43_layers, "load", counted)
     times = whole["time"].values[[9, 4]] + np.array([30, -20], "timedelta64[h]")  # a day from each
     some = read_mcd43a1(path, ["C01"], kernels=True, times=times)
     assert some.identical(whole.isel(time=[4, 9]))

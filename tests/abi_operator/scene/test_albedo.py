@@ -171,6 +171,12 @@ def test_without_file_land_of_the_mask_has_no_albedo(make_model):
     assert (values[..., 0] == 0.06).all() and np.isnan(values[..., 1]).all()
 
 
+@pytest.mark.parametrize("wrong", [-0.1, 1.1, np.nan])
+def test_an_albedo_of_water_is_one(make_model, wrong):
+    with pytest.raises(InputError, match=f"the albedo of water is {wrong:g}; it must be 0 to 1"):
+        surface_albedo(make_model(), BANDS, None, wrong)
+
+
 def test_some_albedo_must_be_named(make_model):
     with pytest.raises(InputError, match="name an albedo file, an albedo of the ocean, or both"):
         surface_albedo(make_model(), BANDS, None, None)

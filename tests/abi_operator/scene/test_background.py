@@ -39,7 +39,10 @@ def test_states_have_it_as_it_was_made(made):
 
 
 def test_what_cannot_be_is_refused(made, make_model):
-    with pytest.raises(InputError, match="0 or more; got -0.1"):
-        scenario(make_model(), ocean_albedo=0.06, background_aerosol=-0.1)
+    for depth in (-0.1, 1e6, np.nan):
+        with pytest.raises(
+            InputError, match=f"is {depth:g}; it must be 0 or more".replace("+", ".")
+        ):
+            scenario(make_model(), ocean_albedo=0.06, background_aerosol=depth)
     with pytest.raises(InputError, match="background_ssa is 1.5 at band=0"):
         check_scenario(made.assign(background_ssa=0 * made["background_ssa"] + 1.5))

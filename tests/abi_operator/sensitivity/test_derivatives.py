@@ -282,8 +282,9 @@ def test_correlations_are_judged_whatever_the_units():
     """And drawn: those of 1 leave no other direction, in the smallest of units."""
     some = [declared(x, "smoke") for x in ("aod_550", "ssa", "albedo")]
     inputs = [one.stepping(x) for one, x in zip(some, (1e3, 3e-4, 3e-4), strict=True)]
-    with pytest.raises(ValueError, match="these correlations cannot be"):
-        covariance_of(inputs, {("ssa", "albedo"): -1.5})
+    for wrong in (-1.5, 2.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match=f"is -1 to 1; got {wrong} of ssa and albedo"):
+            covariance_of(inputs, {("ssa", "albedo"): wrong})
     tiny = covariance_of([one.stepping(1e-9) for one in inputs])
     tiny[0, 1] = 5e-19
     with pytest.raises(ValueError, match="is symmetric"):
@@ -305,6 +306,8 @@ def test_what_is_no_covariance_is_told(case):
     _, jacobian, covariance = case
     with pytest.raises(ValueError, match=r"symmetric, \(8, 8\); got \(3, 3\)"):
         variance_parts(jacobian, covariance[:3, :3])
+    with pytest.raises(ValueError, match="the covariance of 2 inputs is finite; got .*nan"):
+        variance_parts(jacobian[..., :2], np.diag([1.0, np.nan]))
     names = ("aod_550", "ssa", "albedo_C03")
     pairs = {names[:2]: 0.9, names[1:]: 0.9, names[::2]: -0.9}
     with pytest.raises(ValueError, match="these correlations cannot be"):

@@ -140,8 +140,9 @@ def test_what_there_is_not_is_told(states):
         declared("ssa", "dust").change(states, jnp.zeros(6))
     with pytest.raises(ValueError, match="no albedo.C05: instead of 'C05' there is"):
         declared("albedo_C05").change(states, jnp.zeros(6))
-    with pytest.raises(ValueError, match="a step is above 0; got 0"):
-        declared("albedo").stepping(0.0)
+    for step in (0.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=f"a step is above 0 and finite; got {step} for alb"):
+            declared("albedo").stepping(step)
 
 
 @pytest.mark.parametrize(
