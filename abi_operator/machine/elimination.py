@@ -1,7 +1,10 @@
 """Inverses and quotients of symmetric positive definite matrices, batch last.
 
 Halving needs no pivots here: with blocks ``[[p, q], [q^T, r]]`` of a positive definite matrix both
-p and the Schur complement r - q^T p^-1 q are positive definite again.
+p and the Schur complement r - q^T p^-1 q are positive definite again. Small blocks are inverted,
+which is rounded as substitution is where their eigenvalues are alike. The smallest of the whole
+matrix is one of the last Schur complement's, whose two rows are therefore substituted (`Pair`):
+under layers of 1e5 that absorb nothing it is 1e-5 of the others, along isotropic light.
 """
 
 from collections.abc import Sequence
@@ -129,16 +132,62 @@ class _Factors(NamedTuple):
         return sum(block.shape[0] for block in self.u.blocks)
 
 
+class Pair(NamedTuple):
+    """Factors of the last two rows, ``[[p, q], [q, s + q^2 / p]]``.
+
+    Where one eigenvalue is far below the others an inverse is large along its vector alone, and is
+    rounded as if it were as large along all others: what it makes of a right side across that
+    vector is off by rounding times their ratio. Substitution errs along the vector only.
+
+    Parameters
+    ----------
+    own
+        1 / p, and 0.
+    along
+        -q / p, and 1.
+    over
+        1 / s.
+    """
+
+    own: Float[Array, "2 *batch"]
+    along: Float[Array, "2 *batch"]
+    over: Float[Array, "*batch"]
+
+
+def pair(a: Float[Array, "2 2 *batch"]) -> Pair:
+    """Factors of a matrix of two rows."""
+    return Pair(*fenced(_pair)(a))
+
+
+def _pair(a):
+    over = 1 / a[0, 0]
+    along = -a[0, 1] * over
+    rest = a[1, 1] + a[0, 1] * along
+    return jnp.stack([over, 0 * over]), jnp.stack([along, 0 * over + 1]), 1 / rest
+
+
+def of_pair(pair: Pair, right: Float[Array, "2 _ *batch"]) -> Float[Array, "2 _ *batch"]:
+    """``a^-1 right`` of the factors of a, for use in kernels."""
+    own, along, over = pair
+    rest = over * (right[1] + along[0] * right[0])
+    return total([own[:, None] * right[0], along[:, None] * rest])
+
+
 def _factors(a):
     """Factors, or the inverse where it is small or its products are not kernels of our own."""
     n = a.shape[0]
-    return _factors_of(a, 0, n, _CLOSED_FORM if n <= _HALVED_AGAIN else n - n // 2)
+    return _factors_of(a, 0, n, _CLOSED_FORM if n <= _HALVED_AGAIN else n - n // 2, last=True)
 
 
-def _factors_of(a, start, n, largest):
-    """Of the rows and columns from `start` on, cut out inside the kernels and not copied before."""
+def _factors_of(a, start, n, largest, last=False):
+    """Of the rows and columns from `start` on, cut out inside the kernels and not copied before.
+
+    The smallest eigenvalues are those of the `last` ones.
+    """
     if n <= largest:
         own = slice(start, start + n)
+        if n == _CLOSED_FORM and last:
+            return Pair(*fenced(lambda a: _pair(a[own, own]))(a))
         if n <= _CLOSED_FORM:
             return fenced(lambda a: _inverse_of_one_or_two(a[own, own]))(a)
         return _as_kernel(a[own, own])
@@ -151,11 +200,16 @@ def _factors_of(a, start, n, largest):
         return a[middle:end, middle:end] - _outer(q, _rows(u))
 
     schur = kernel_of_product(schur_complement, n // 2)(a, u)
-    return _Factors(first, u, _factors_of(schur, 0, end - middle, largest))
+    return _Factors(first, u, _factors_of(schur, 0, end - middle, largest, last))
 
 
 def _substituted(factors, right, rows=slice(None), columns=slice(None)) -> Rows:
     """Rows of the quotient of a part of `right`."""
+    if isinstance(factors, Pair):
+        times = kernel_of_product(
+            lambda *x: of_pair(Pair(*x[:3]), x[3][rows, columns]), _CLOSED_FORM
+        )
+        return Rows((times(*factors, right),))
     if not isinstance(factors, _Factors):
         times = kernel_of_product(lambda a, b: product(a, b[rows, columns]), factors.shape[0])
         return Rows((times(factors, right),))

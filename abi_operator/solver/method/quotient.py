@@ -17,7 +17,7 @@ from ...machine.algebra import (
     total,
     weighted,
 )
-from ...machine.elimination import inverse, solve
+from ...machine.elimination import Pair, inverse, of_pair, pair, solve
 from .bordered import Bordered, Vector, reciprocal
 
 _ONE_KERNEL = 2  # nodes up to which a product of three matrices is computed in one pass
@@ -73,12 +73,12 @@ def minus_quotient(
     if left.core.shape[0] > _ONE_KERNEL:
         return minus_and_quotient(base, factor, left, middle, right)[0]
     ratio, own = _ratios(left, reciprocal(middle.diagonal), right)
-    middle_inverse = inverse(middle.core)
+    factors = pair(middle.core) if len(middle.core) == 2 else inverse(middle.core)
     cores, borders, diagonals, corners = _parts(base)
-    drive = (left.border, right.border, middle.border, middle_inverse)
+    drive = (left.border, right.border, middle.border, factors)
     passed = (left.corner, right.corner, middle.corner, ratio, own)
     return Bordered(
-        _core_at_once(cores, factor, left.core, middle_inverse, right.core),
+        _core_at_once(cores, factor, left.core, factors, right.core),
         _border_at_once(borders, factor, left.core, *drive, ratio),
         _minus_diagonal(diagonals, factor, left.diagonal, ratio),
         _corner_at_once(corners, factor, *drive, *passed),
@@ -158,19 +158,23 @@ def _corner(base, factor, target, driven, left, right, middle, ratio, own):
     return weighted(base) - factor * corner
 
 
-@fenced
-def _core_at_once(base, factor, left, middle_inverse, right):
-    return weighted(base) - factor * product(left, product(middle_inverse, right))
+def _solved(factors, right):
+    return of_pair(factors, right) if isinstance(factors, Pair) else product(factors, right)
 
 
 @fenced
-def _border_at_once(base, factor, core, left, right, middle, middle_inverse, ratio):
-    driven = product(middle_inverse, right - middle * ratio)
+def _core_at_once(base, factor, left, factors, right):
+    return weighted(base) - factor * product(left, _solved(factors, right))
+
+
+@fenced
+def _border_at_once(base, factor, core, left, right, middle, factors, ratio):
+    driven = _solved(factors, right - middle * ratio)
     return weighted(base) - factor * (product(core, driven) + left * ratio)
 
 
 @fenced
-def _corner_at_once(base, factor, left, right, middle, middle_inverse, *passed):
+def _corner_at_once(base, factor, left, right, middle, factors, *passed):
     ratio, own = passed[-2:]
-    driven = product(middle_inverse, right[:, :1] - middle[:, :1] * ratio[:1])
+    driven = _solved(factors, right[:, :1] - middle[:, :1] * ratio[:1])
     return _corner(base, factor, left - middle * own, driven, *passed)

@@ -254,6 +254,21 @@ def test_quotients_of_positive_definite_matrices(n):
         np.testing.assert_allclose(slope, (above - below) / 2e-5, atol=1e-6 * scale)
 
 
+@pytest.mark.parametrize("n", [2, 3, 5, 8])
+def test_a_small_eigenvalue_does_not_round_what_lies_across(n):
+    """Of 1 beside 1e5, in single precision: of an inverse rounding of the one were as large."""
+    rng = np.random.default_rng(n)
+    along = rng.uniform(0.2, 1, (n, 9))
+    along = along / np.linalg.norm(along, axis=0)
+    ones = along[:, None] * along[None]
+    others = np.eye(n)[..., None] - ones
+    across = np.einsum("ijb,jkb->ikb", others, rng.normal(size=(n, 3, 9)))
+    a, right = (np.asarray(x, np.float32) for x in (1e5 * others + ones, across))
+    found = np.asarray(jax.jit(lambda a, r: solve(a, [r])[0].joined())(a, right), float)
+    found = 1e5 * np.einsum("ijb,jkb->ikb", others, found)
+    np.testing.assert_allclose(found, across, atol=1e-5)  # an inverse: 6e-4 and more
+
+
 def test_an_entry_of_a_stack_is_read_by_the_kernel_it_is_given_to():
     """Forward and reverse mode and `jax.vmap` reach the stack through it."""
     stack = jnp.asarray(np.random.default_rng(5).uniform(1, 2, (3, 8)))
