@@ -137,9 +137,14 @@ def conservative_columns(depth, count=64, layers=16, num_streams=4):
 
 
 @pytest.mark.float32
-@pytest.mark.parametrize(("depth", "right"), [(10, 1e-5), (1e3, 1e-5), (1e5, 1e-5), (3e7, None)])
+@pytest.mark.parametrize(
+    ("depth", "right"), [(10, 1e-5), (1e3, 1e-5), (1e5, 1e-5), (9.9e5, 2e-5), (3e7, None)]
+)
 def test_depth_without_absorption_is_right_or_refused(depth, right):
-    """Rounding weighs as much in any; where it is all, there is no number."""
+    """Rounding weighs as much in any; where it is all, there is no number.
+
+    It is some 2e-7 of one column, whose reflectance is 0.02 to 0.03, what its terms leave.
+    """
     columns = conservative_columns(depth)
     single = np.asarray(toa_brf(*columns, num_streams=4))
     assert single.dtype == np.float32
@@ -148,24 +153,25 @@ def test_depth_without_absorption_is_right_or_refused(depth, right):
         return
     with jax.enable_x64(True):
         double = np.asarray(toa_brf(*as_double(columns), num_streams=4))
-    assert np.max(abs(single / double - 1)) < right
+    error = np.sort(abs(single / double - 1))
+    assert error[-1] < right and error[-2] < 4e-6
 
 
 @pytest.mark.float32
-@pytest.mark.parametrize("num_streams", [4, 6])
-def test_depth_weighs_nothing_in_what_scatters_backwards(num_streams):
-    """Whose reflectances leave a difference of larger numbers, at a depth of 10 and of 1e5."""
+@pytest.mark.parametrize(("num_streams", "right"), [(4, 1e-4), (6, 1e-4), (8, 3e-4)])
+def test_depth_weighs_nothing_in_what_scatters_backwards(num_streams, right):
+    """Whose reflectances leave a difference of larger numbers, thin layers or deep."""
     _, _, _, *beside = conservative_columns(1.0, num_streams=num_streams)
     moments = np.broadcast_to(
         np.float32(-0.9) ** np.arange(num_streams + 1), (64, 1, num_streams + 1)
     )
-    for depth in (10, 1e5):
+    for depth in (10, 1e5, 9.9e5):
         tau = np.full((64, 1), depth, np.float32)
         columns = [tau, np.ones_like(tau), moments.astype(np.float32), *beside]
         single = np.asarray(toa_brf(*columns, num_streams=num_streams))
         with jax.enable_x64(True):
             double = np.asarray(toa_brf(*as_double(columns), num_streams=num_streams))
-        assert np.max(abs(single - double) / np.maximum(abs(double), 0.01)) < 1e-4
+        assert np.max(abs(single - double) / np.maximum(abs(double), 0.01)) < right
 
 
 @pytest.mark.float32
