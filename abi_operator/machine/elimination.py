@@ -4,7 +4,8 @@ Halving needs no pivots here: with blocks ``[[p, q], [q^T, r]]`` of a positive d
 p and the Schur complement r - q^T p^-1 q are positive definite again. Small blocks are inverted,
 which is rounded as substitution is where their eigenvalues are alike. The smallest of the whole
 matrix is one of the last Schur complement's, whose two rows are therefore substituted (`Pair`):
-under layers of 1e5 that absorb nothing it is 1e-5 of the others, along isotropic light.
+under layers of 1e5 that absorb nothing it is 1e-5 of the others, along isotropic light. Of more
+rows than are halved again double precision inverts the last half, as it does the first.
 """
 
 from collections.abc import Sequence
@@ -184,6 +185,8 @@ def _factors_of(a, start, n, largest, last=False):
 
     The smallest eigenvalues are those of the `last` ones.
     """
+    if last and n > _CLOSED_FORM and a.dtype == jnp.float32:
+        largest = min(largest, n - 1)  # down to a pair, see the head of this file
     if n <= largest:
         own = slice(start, start + n)
         if n == _CLOSED_FORM and last:

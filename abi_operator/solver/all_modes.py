@@ -14,14 +14,20 @@ from .gradient import emission
 from .gradient.emission import radiance
 from .gradient.emitting_mode import Heating
 from .gradient.mode_sum import Given, ModeSum, mode_sum
-from .gradient.modes import How
+from .gradient.modes import LATER, How
 from .lit import seen_from_the_view, weights_of_modes
 from .method.adding import emitting_ground
 from .method.around import Above
 from .method.azimuth import Directions, legendre_tables, weighted_moments
 from .method.bordered import Bordered
 from .method.delta_m import ScaledLayers
-from .method.ground import isotropic, lambertian, reflecting
+from .method.ground import (
+    Grounds,
+    absorbed_by_lambertian,
+    isotropic,
+    lambertian,
+    reflecting,
+)
 from .method.surface import AnySurface
 from .skipping.plan import LayersOfModes
 
@@ -62,22 +68,22 @@ def twice_reflected_between(
     options: Options,
 ) -> Float[Array, "view *batch"]:
     """The same of layers between others, which are given in all modes (`method.around`)."""
-    grounds = jax.tree.map(lambda x: x[0], below), jax.tree.map(lambda x: x[1:], below)
+    grounds = _by_modes(below)
     return _twice_reflected(layers, directions, grounds, azimuth, known, options, above)
 
 
 def _twice_reflected(layers, directions, grounds, azimuth, known, options, above=None):
-    mean, others = grounds
     even, odd = weighted_moments(layers)
     sun_secants, cosines = directions.sun_secants, directions.cosines
     inputs = ModeSum(
         layers=LayersOfModes(layers.tau, layers.coalbedo, sun_secants, (even, odd)),
         view_secants=1 / cosines[1:],
         beams=legendre_tables(options.num_streams, options.num_modes, cosines).beams,
-        ground=mean,
-        grounds=others,
+        ground=grounds.mean,
+        grounds=grounds.others,
         weights=weights_of_modes(options.num_modes, azimuth),
         above=above,
+        absorbed=grounds.absorbed,
     )
     return mode_sum(inputs, known, _how(options))
 
@@ -108,7 +114,7 @@ def radiated(shining: Shining, options: Options) -> Float[Array, "*batch"]:
     cosines = directions.cosines
     one = isotropic(options.num_streams, cosines)
     tables = legendre_tables(options.num_streams, options.num_modes, cosines)
-    mean, others = grounds_of(column.albedo, directions, options)
+    grounds = grounds_of(column.albedo, directions, options)
     zero = jnp.zeros_like(column.mu0)
     shine = column.planck_levels, column.surface_emission, column.isotropic_top
     planck, from_ground, from_above = (zero if x is None else x for x in shine)
@@ -116,11 +122,11 @@ def radiated(shining: Shining, options: Options) -> Float[Array, "*batch"]:
     at_top, at_ground = (zero, zero) if cold else (planck[0], planck[-1])
     heating = Heating(
         jumps=jnp.zeros_like(column.tau) if cold else planck[1:] - planck[:-1],
-        ground=emitting_ground(mean, one, from_ground, at_ground).column,
+        ground=emitting_ground(grounds.mean, one, from_ground, at_ground).column,
         above=2 * (from_above - at_top),
     )
     weights = 0.5 * sun * weights_of_modes(options.num_modes, column.relative_azimuth[0])
-    lit = seen_from_the_view(layers, tables, directions, mean, others, weights, heating)
+    lit = seen_from_the_view(layers, tables, directions, grounds, weights, heating)
     return radiance(lit, given, _how(options))
 
 
@@ -128,16 +134,22 @@ def _how(options: Options) -> How:
     return How(not options.tms, options.error_budget, options.num_doublings, options.delta_m)
 
 
-def grounds_of(
-    albedo: Array | AnySurface, directions: Directions, options: Options
-) -> tuple[Bordered, Bordered | None]:
-    """Ground in mode 0, and in the others (None where they do not see it)."""
+def grounds_of(albedo: Array | AnySurface, directions: Directions, options: Options) -> Grounds:
+    """Ground in all modes."""
     cosines, num_streams = directions.cosines, options.num_streams
     if not isinstance(albedo, AnySurface):
-        return lambertian(albedo, cosines, num_streams), None
+        mean = lambertian(albedo, cosines, num_streams)
+        return Grounds(mean, absorbed=absorbed_by_lambertian(albedo))
 
     # All modes at once: a reflectance is evaluated at its azimuths only once.
-    grounds = jax.vmap(lambda m: reflecting(albedo, m, cosines, num_streams))(
-        jnp.arange(options.num_modes)
+    return _by_modes(
+        jax.vmap(lambda m: reflecting(albedo, m, cosines, num_streams))(
+            jnp.arange(options.num_modes)
+        )
     )
-    return jax.tree.map(lambda x: x[0], grounds), jax.tree.map(lambda x: x[1:], grounds)
+
+
+def _by_modes(admittances: Bordered) -> Grounds:
+    """From those of all modes, on the first axis of every leaf."""
+    mean, others = (jax.tree.map(lambda x, i=i: x[i], admittances) for i in (0, LATER))
+    return Grounds(mean, others)

@@ -17,6 +17,7 @@ from .method.azimuth import Directions, LegendreTables, weighted_moments
 from .method.bordered import Bordered, Vector
 from .method.delta_m import ScaledLayers
 from .method.doublings import Doublings
+from .method.ground import Grounds
 from .method.mode_layers import Layers
 
 
@@ -51,8 +52,7 @@ def seen_from_the_view(
     layers: ScaledLayers,
     tables: LegendreTables,
     directions: Directions,
-    ground: Bordered,
-    grounds: Bordered | None,
+    grounds: Grounds,
     weights: Float[Array, "mode *batch"],
     heating: Heating,
 ) -> Lit:
@@ -62,8 +62,8 @@ def seen_from_the_view(
     ----------
     layers, tables, directions
         As in `method.azimuth.emitting_mean`.
-    ground, grounds
-        Its admittance in mode 0, and in the others that there are weights for; None is black.
+    grounds
+        In all modes that there are weights for.
     weights
         Of each mode's reflection of sunlight.
     heating
@@ -73,7 +73,8 @@ def seen_from_the_view(
     even, odd = (x[: weights.shape[0]] for x in tables.beams)
     of_air = air(layers, directions.sun_secants, view)
     column = Vector(heating.ground.nodes, heating.ground.beams[1:])
-    return Lit(of_air, (even, odd), ground, grounds, weights, heating._replace(ground=column))
+    heating = heating._replace(ground=column)
+    return Lit(of_air, (even, odd), *grounds[:2], weights, heating, grounds.absorbed)
 
 
 def seen_from(
@@ -81,7 +82,7 @@ def seen_from(
     layers: ScaledLayers,
     tables: LegendreTables,
     directions: Directions,
-    ground: Bordered,
+    grounds: Grounds,
     heating: Heating,
 ) -> Lit:
     """Thermal light of the mean towards a beam, which takes the place of sun and view.
@@ -99,8 +100,10 @@ def seen_from(
     views = jnp.broadcast_to(1 / directions.cosines[1:, None], shape)
     secants = one(jnp.concatenate([directions.sun_secants[None], views]))[0]
     even, odd = (twice(x[:1], 1) for x in tables.beams)
-    nothing = jnp.zeros_like(ground.diagonal[:1])
-    mean = Bordered(ground.core, twice(ground.border, 1), twice(ground.diagonal, 0), nothing)
+    mean = grounds.mean
+    nothing = jnp.zeros_like(mean.diagonal[:1])
+    mean = Bordered(mean.core, twice(mean.border, 1), twice(mean.diagonal, 0), nothing)
     column = Vector(heating.ground.nodes, one(heating.ground.beams))
     of_air = air(layers, secants, secants)
-    return Lit(of_air, (even, odd), mean, None, nothing, heating._replace(ground=column))
+    heating = heating._replace(ground=column)
+    return Lit(of_air, (even, odd), mean, None, nothing, heating, grounds.absorbed)

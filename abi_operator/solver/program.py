@@ -15,7 +15,7 @@ from .gradient.fluxes import spherical_albedo
 from .gradient.modes import How
 from .lit import seen_from, upside_down
 from .method.adding import emitting_ground
-from .method.ground import black
+from .method.ground import Grounds, black
 from .method.surface import AnySurface
 from .problem import Problem, seen_at_once
 
@@ -48,12 +48,12 @@ def emerging(column: Column, options: Options) -> Emerging:
     if all(x is None for x in shine):
         at_once = seen_at_once(problem)
         return Emerging(at_once + 0.5 * problem.reflection(at_once), None)
-    mean, others = grounds_of(column.albedo, problem.directions, options)
+    mean, others, absorbed = grounds_of(column.albedo, problem.directions, options)
     zero = jnp.zeros_like(column.mu0)
     planck, from_ground, from_above = (zero if x is None else x for x in shine)
     jumps = None if column.planck_levels is None else planck[1:] - planck[:-1]
     at_top, at_ground = (zero, zero) if jumps is None else (planck[0], planck[-1])
-    emission = emitting_ground(mean, problem.one, from_ground, at_ground)
+    emission = emitting_ground(mean, problem.one, from_ground, at_ground, absorbed)
     top, emission = problem.emitting_mean(mean, emission, jumps)
     emitted = top.emerging(emission, problem.one, from_above, at_top)[1:]
     brf = seen_at_once(problem) + 0.5 * (top.reflection() + problem.higher(others))
@@ -70,7 +70,7 @@ def ground_response(column: Column, options: Options) -> GroundResponse:
     problem = Problem(column, options)
     ground = black(problem.directions.cosines, options.num_streams)
     zero = jnp.zeros_like(column.mu0)
-    emission = emitting_ground(ground, problem.one, zero + 1, zero)
+    emission = emitting_ground(ground, problem.one, zero + 1, zero, zero + 1)
     top, emission = problem.emitting_mean(ground, emission, None)
     transmission = top.emerging(emission, problem.one, zero, zero)
     return GroundResponse(
@@ -83,10 +83,10 @@ def ground_response(column: Column, options: Options) -> GroundResponse:
 def plane_albedo(column: Column, options: Options) -> Float[Array, "*batch"]:
     """Share of the sun's light that leaves the top in all directions."""
     problem = Problem(column, options)
-    mean, _ = grounds_of(column.albedo, problem.directions, options)
+    grounds = grounds_of(column.albedo, problem.directions, options)
     nothing = jnp.zeros_like(problem.layers.tau), 0.0 * problem.one
     heating = Heating(*nothing, jnp.full_like(column.mu0, 2))
-    lit = seen_from(0, *problem.shared(), mean, heating)
+    lit = seen_from(0, *problem.shared(), grounds, heating)
     return radiance(lit, Given(problem.doublings), _NO_SUN)
 
 
@@ -122,7 +122,7 @@ def from_ground(column: Column, options: Options, beam: Any) -> Float[Array, "*b
     zero = jnp.zeros_like(column.mu0)
     emission = emitting_ground(ground, problem.one, zero + 1, zero).column
     heating = Heating(jnp.zeros_like(problem.layers.tau), emission, zero)
-    lit = seen_from(beam, *problem.shared(), ground, heating)
+    lit = seen_from(beam, *problem.shared(), Grounds(ground, absorbed=zero + 1), heating)
     return radiance(lit, Given(problem.doublings), _NO_SUN)
 
 

@@ -118,7 +118,7 @@ def _parts(tile: Column, upper: Problem | None, lower: Problem | None, options: 
     assert any_of_both is not None
     directions = any_of_both.directions
     cosines, num_streams = directions.cosines, options.num_streams
-    mean, others = grounds_of(tile.albedo, directions, options)
+    mean, others, _ = grounds_of(tile.albedo, directions, options)
     weights = weights_of_modes(options.num_modes, tile.relative_azimuth)
     beams = legendre_tables(num_streams, options.num_modes, cosines).beams
 

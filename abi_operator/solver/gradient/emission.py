@@ -57,6 +57,8 @@ class Lit(NamedTuple):
         Of each mode's reflection in the sum. [radiance unit]
     heating
         Thermal light of the mean.
+    absorbed
+        As in `mode_sum.ModeSum`.
     """
 
     air: Air
@@ -65,6 +67,7 @@ class Lit(NamedTuple):
     grounds: Bordered | None
     weights: Float[Array, "mode *batch"]
     heating: Heating
+    absorbed: Float[Array, "*batch"] | None = None
 
 
 class Given(NamedTuple):
@@ -205,7 +208,7 @@ def _of_ground(lit: Lit) -> Emission:
     """What the ground emits, with a place for the sun among the beams."""
     nodes, beams = lit.heating.ground.nodes, lit.heating.ground.beams
     column = Vector(nodes, jnp.concatenate([jnp.zeros_like(beams), beams]))
-    return Emission(column, None, of_ground(lit.ground))
+    return Emission(column, None, of_ground(lit.ground, lit.absorbed))
 
 
 @partial(radiance.defjvp, symbolic_zeros=True)
@@ -230,7 +233,7 @@ def radiance_and_gradient(
     def step(carry, mode):
         value, slopes, of_mean, room = carry
         # Thermal light is the same in all azimuths: there is none in any mode but the mean.
-        mean = mode.order.mean
+        mean, ground = mode.order.mean, mode.below(lit.ground)
         jumps, column, above = jax.tree.map(lambda x: mean * x, lit.heating)
         answers, fields, room, found = slopes_of_mode(
             lit.air,
@@ -239,7 +242,7 @@ def radiance_and_gradient(
             single_scattering,
             mode.order,
             mode.kernels(),
-            mode.below(lit.ground),
+            (ground, of_ground(ground, lit.absorbed)),
             column,
             radiance_at_the_top(above, mode.weight),
             slopes,
@@ -248,8 +251,8 @@ def radiance_and_gradient(
         reflection, emitted = answers
         assert found.jumps is not None
         heating = Heating(found.jumps, found.column, slope_of_light_from_above(fields))
-        of_ground = found.ground if lit.grounds is None else None
-        of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, (of_ground, heating))
+        new = found.ground if lit.grounds is None else None, heating
+        of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, new)
         own = None if lit.grounds is None else found.ground
         value = value + mode.weight * reflection + emitted
         return (value, found.air, of_mean, room), (reflection, found.beams, own)
@@ -261,7 +264,8 @@ def radiance_and_gradient(
     (value, air, (ground, heating), _), (reflections, beams, grounds) = carry, rows
     if grounds is not None:
         ground, grounds = (jax.tree.map(lambda x, i=i: x[i], grounds) for i in (0, LATER))
-    return value, Lit(air, beams, ground, grounds, reflections, heating)
+    absorbed = jax.tree.map(jnp.zeros_like, lit.absorbed)
+    return value, Lit(air, beams, ground, grounds, reflections, heating, absorbed)
 
 
 @radiance_and_gradient.defjvp

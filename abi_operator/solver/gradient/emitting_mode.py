@@ -23,13 +23,13 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, matmul
 from ...machine.kernels import one_kernel
-from ..method.absorption import of_ground
 from ..method.adding import top
 from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
 from ..method.mode_layers import Layer, Layers, Order, added_to, read
 from .fields import Fields, pair
-from .layer import absorption, climb, descend_warm
+from .isotropic import absorption
+from .layer import climb, descend_warm
 from .mode import Kernels
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 from .room import Keeper, Room
@@ -88,7 +88,7 @@ def slopes_of_mode(
     single_scattering: bool,
     order: Order,
     kernels: Kernels,
-    ground: Bordered,
+    below: tuple[Bordered, Vector | None],
     column: Vector | None,
     at_the_top: AtTheTop,
     slopes: Air,
@@ -123,8 +123,9 @@ def slopes_of_mode(
     def up(below, number):
         return put_one(below, air, jumps, doublings, number, order, kernels), None
 
-    below = ground, (column, of_ground(ground)), room
-    (stack, (column, _), room), _ = jax.lax.scan(up, below, numbers, reverse=True)
+    ground, absorbed = below
+    at_ground = ground, (column, absorbed), room
+    (stack, (column, _), room), _ = jax.lax.scan(up, at_ground, numbers, reverse=True)
     answers, fields = at_the_top(stack, column)
 
     @compiled
@@ -156,8 +157,8 @@ def slopes_of_mode(
     nothing = jnp.zeros_like(kernels[0].beams), jnp.zeros_like(kernels[1].beams)
     above = fields, nothing, slopes, jax.tree.map(jnp.zeros_like, jumps)
     (at_bottom, beams, slopes, of_jumps), _ = jax.lax.scan(down, above, numbers)
-    at_ground = pair(1.0, [at_bottom]), _slope_of_column(at_bottom)
-    return answers, fields, room, Slopes(slopes, beams, *at_ground, of_jumps)
+    of_ground = pair(1.0, [at_bottom]), _slope_of_column(at_bottom)
+    return answers, fields, room, Slopes(slopes, beams, *of_ground, of_jumps)
 
 
 def _read(

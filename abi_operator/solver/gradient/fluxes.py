@@ -20,6 +20,7 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from ...machine.algebra import matmul
+from ..method.absorption import of_ground
 from ..method.adding import top
 from ..method.azimuth import mode_kernels
 from ..method.bordered import Bordered
@@ -69,7 +70,7 @@ def spherical_albedo_and_gradient(
         False,
         Order(0 * one, one),
         _kernels_of_the_mean(num_nodes, tau[0]),
-        ground,
+        (ground, of_ground(ground, jnp.ones_like(tau[0]))),
         None,
         _at_the_top,
         jax.tree.map(jnp.zeros_like, air),

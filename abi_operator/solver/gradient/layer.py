@@ -8,13 +8,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...machine.kernels import one_kernel, small_enough
-from ..method.absorption import absorbing, less, of_layer, of_stack, through
 from ..method.bordered import Bordered, Vector, combined
 from ..method.doublings import Doublings, repeated
-from ..method.mode_layers import Layer, Order
 from ..method.quotient import Quotient, minus_and_quotient
+from . import isotropic
 from .beams import Step, next_step, own_beams
 from .fields import Action, Feed, Fields, Heat, act, advance, cotangents, feed
+from .isotropic import Absorption
 from .stages import undo_start, undouble
 from .thermal import (
     Warmth,
@@ -36,51 +36,6 @@ class Part(NamedTuple):
 
     core: Any
     border: Any
-
-
-class Absorption(NamedTuple):
-    """What is absorbed of isotropic light, where that is kept (`method.absorption`).
-
-    Parameters
-    ----------
-    stack
-        Y 1 of the stack below, at the nodes and at both beams.
-    layer
-        A 1 of the layer.
-    mean
-        Whether this is the azimuthal mean: 1 or 0.
-    """
-
-    stack: Vector
-    layer: Vector
-    mean: Float[Array, ""]
-
-    def in_mean(self, function: Callable[..., Any], matrix: Bordered, ones: Vector, *more: Any):
-        """A matrix and its y from `function` of all of these in the mean, else as they are."""
-        given = matrix, ones, *more
-        return jax.lax.cond(
-            self.mean > 0, function, lambda matrix, ones, *_: (matrix, ones), *given
-        )
-
-
-def absorption(
-    stack: Vector | None, layer: Layer, view_secant: Float[Array, "*batch"], order: Order
-) -> Absorption | None:
-    """What a layer and the stack below it absorb, where the stack's is kept."""
-    if stack is None:
-        return None
-    own = of_layer(layer.coalbedo, layer.secants(view_secant[None]), layer.even.shape[0])
-    return Absorption(stack, own, order.mean)
-
-
-def _doubled(y, ones, h, quotient):
-    ones = 2.0 * less(ones, h, quotient, ones)
-    return absorbing(y, ones), ones
-
-
-def _stacked(stack, ones, below, h, quotient):
-    ones = of_stack(below, ones, h, quotient)
-    return absorbing(stack, ones), ones
 
 
 class Kept(NamedTuple):
@@ -131,29 +86,20 @@ def climb(
     # A Z^-1 C from the other side, whose quotient gives that by C by another (`undo_start`).
     of_ones = () if absorption is None else (absorption.layer.nodes[:, None],)
     y, by_a = minus_and_quotient([(h, a)], h * square, fraction, z, a, of_ones)
-    ones = None
-    if absorption is not None:
-
-        def started(y, ones, h, fraction, z, by_a):
-            ones = h * (ones - h * h * through(fraction, z, by_a, ones))
-            return absorbing(y, ones), ones
-
-        y, ones = absorption.in_mean(started, y, absorption.layer, h, fraction, z, by_a)
-
+    y, half = isotropic.started(absorption, y, h, p, fraction, z, by_a)
     lag = None if warmth is None else start_of_lag(h, fraction)
 
     def double(k, carry):
-        y, z, lag, ones, h, room = carry
+        y, z, lag, half, h, room = carry
         z = combined([1.0, h], [z, y])
         lag = None if lag is None else doubled_lag(lag, y)
         right = feed(y)
         y, quotient = minus_and_quotient([(2.0, y)], 2 * h, y, z, y)
-        if absorption is not None:
-            y, ones = absorption.in_mean(_doubled, y, ones, h, quotient)
-        return y, z, lag, ones, 2 * h, keep(room, Doubled(_part(quotient), right), k)
+        y, half, quotient = isotropic.doubled(absorption, y, half, quotient, h)
+        return y, z, lag, half, 2 * h, keep(room, Doubled(_part(quotient), right), k)
 
     if doublings.most:
-        y, z, lag, ones, _, room = repeated(double, number, (y, z, lag, ones, h, room))
+        y, z, lag, half, _, room = repeated(double, number, (y, z, lag, half, h, room))
     h = 0.5 * tau
     total = combined([1.0, 1.0], [stack, y])
     middle = combined([h, 0.5, 0.5 * h], [stack, z, y])
@@ -162,10 +108,7 @@ def climb(
     base = [(1.0, total), (1.0, y)]
     stack, quotient = minus_and_quotient(base, h, total, middle, total, loads)
     stack = Bordered(stack.core, stack.border, jnp.ones_like(stack.diagonal), stack.corner)
-    if absorption is not None:
-        assert ones is not None
-        below = absorption.stack
-        stack, ones = absorption.in_mean(_stacked, stack, ones, below, h, quotient)
+    stack, ones, quotient = isotropic.stacked(absorption, stack, half, quotient, h)
     column, response = None, None
     if loaded is not None:
         column, response = respond(loaded, total, middle, h, quotient)

@@ -37,17 +37,17 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, matmul, total
 from ...machine.kernels import one_kernel
-from ..method.absorption import of_ground
 from ..method.adding import top
 from ..method.around import Above
-from ..method.bordered import Bordered
+from ..method.bordered import Bordered, Vector
 from ..method.doublings import Doublings
 from ..method.layer import ModeKernels
 from ..method.mode_layers import Layer, Layers, Order, added_to, read
 from ..skipping.plan import Plan, over_layers
 from .fields import Fields, pair
 from .interface import slopes_at_face
-from .layer import absorption, climb, descend
+from .isotropic import absorption
+from .layer import climb, descend
 from .pull_back import MatrixSlopes, undo_inverse, undo_matrix
 from .room import Keeper, Room
 
@@ -110,7 +110,7 @@ def mode_slopes(
     single_scattering: bool,
     order: Order,
     kernels: Kernels,
-    ground: Bordered,
+    below: tuple[Bordered, Vector | None],
     weight: Float[Array, "*batch"],
     slopes: Shared,
     room: Room,
@@ -118,7 +118,8 @@ def mode_slopes(
 ) -> tuple[Float[Array, "*batch"], Room, Slopes]:
     """Reflection of a mode, and the slopes of `weight` times it, added to those of other modes.
 
-    There are none in what lies `above` the layers.
+    `below` the layers lies the ground, with what it absorbs of isotropic light where that is kept
+    (`method.absorption`). There are no slopes in what lies `above` them.
 
     The room (`room.Keeper.empty`) is given back filled. Layers are read and written inside the
     kernels: as inputs and outputs of a scan every array would be one more kernel a layer.
@@ -128,7 +129,7 @@ def mode_slopes(
     assert most is not None
     keeper = Keeper(layers.tau, layers.moments.shape[1], most, faces is not None)
     given = _Given(layers, plan, order, kernels, view_secant)
-    stack, room = _up(ground, room, given, keeper, single_scattering)
+    stack, room = _up(below, room, given, keeper, single_scattering)
     closed = stack, weight, *(() if above is None else (above,))
     reflection, fields = given.compiled(_fields_at_the_top, in_parts=True)(*closed)
     beams = (jnp.zeros_like(x.beams) for x in kernels)
@@ -137,15 +138,19 @@ def mode_slopes(
     carry = _down(carry, room, given, keeper, single_scattering)
     fields, (even, odd, view, square), layers, faces = carry
     if faces is not None:
-        below = fields._replace(other=jnp.zeros_like(fields.other))
-        last = slopes_at_face(below, ground, kernels, view_secant, single_scattering, order)
+        at_ground = fields._replace(other=jnp.zeros_like(fields.other))
+        last = slopes_at_face(at_ground, below[0], kernels, view_secant, single_scattering, order)
         faces = added_to(faces, plan.num_groups, last)
     shared = Shared(layers, view, faces)
     return reflection, room, Slopes(shared, even, odd, pair(1.0, [fields]), square)
 
 
 def _up(
-    ground: Bordered, room: Room, given: _Given, keeper: Keeper, single_scattering: bool
+    below: tuple[Bordered, Vector | None],
+    room: Room,
+    given: _Given,
+    keeper: Keeper,
+    single_scattering: bool,
 ) -> tuple[Bordered, Room]:
     """All layers put on the ground; the room filled with what the way down needs of them."""
 
@@ -165,7 +170,6 @@ def _up(
         step = lambda carry, number: put_one(*carry, given, given.place(number))  # noqa: E731
         return over_layers(step, (below, room), given.plan, upwards=True)
 
-    below = ground, of_ground(ground)
     (stack, _), room = given.compiled(all_layers, in_parts=True)(below, room, given)
     return stack, room
 

@@ -49,6 +49,9 @@ class ModeSum(NamedTuple):
     above
         What lies above the layers, modes on the first axis of every leaf; None is free space. It is
         no variable: nobody takes slopes in it (`surroundings`).
+    absorbed
+        What a Lambertian ground absorbs of isotropic light (`method.ground`); None of others. It is
+        no variable beside the ground's admittance.
     """
 
     layers: LayersOfModes
@@ -58,6 +61,7 @@ class ModeSum(NamedTuple):
     grounds: Bordered | None
     weights: Float[Array, "mode view *batch"]
     above: Above | None = None
+    absorbed: Float[Array, "*batch"] | None = None
 
     @property
     def num_nodes(self) -> int:
@@ -97,6 +101,7 @@ class ModeSum(NamedTuple):
             grounds,
             one(self.weights, 1),
             above,
+            self.absorbed,
         )
 
 
@@ -151,15 +156,13 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
 
         put_on = one_kernel(put_on, num_nodes, in_parts=True, num_beams=num_beams)
 
-        def of_all(ground, layers, plan, odd, kernels, view_secants, *above):
+        def of_all(below, layers, plan, odd, kernels, view_secants, *above):
             shared = layers, plan.doublings, odd, kernels, view_secants
 
             def add(below, number):
                 return put_on(below, *shared, *([] if number is None else [number]))
 
-            stack, _ = over_layers(
-                add, (ground, of_ground(ground) if mean else None), plan, upwards=True
-            )
+            stack, _ = over_layers(add, below, plan, upwards=True)
             return above[0].over(stack)[0] if above else top(stack).reflection()
 
         # Of one layer that is the only one XLA would find no use for what tells layers apart, and
@@ -169,7 +172,9 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
         layers = plan.layers.as_layers()
         shared = layers, plan, mode.order.odd, mode.kernels(), inputs.view_secants
         above = () if mode.above is None else (mode.above,)
-        return of_all(mode.below(inputs.ground, mean), *shared, *above)
+        ground = mode.below(inputs.ground, mean)
+        below = ground, of_ground(ground, inputs.absorbed) if mean else None
+        return of_all(below, *shared, *above)
 
     def another(total, mode, counts):
         found = reflection(False, lowered(mode), later, plan_of_later).astype(total.dtype)
@@ -234,7 +239,8 @@ def _reflectance_and_gradient(inputs, plan, how):
         value, slopes, of_mean, room = carry
         kernels, ground = mode.kernels(), mode.below(inputs.ground)
         weight = counts * mode.weight[0]
-        given = shared, plan, how.single_scattering, mode.order, kernels, ground, weight
+        below = ground, of_ground(ground, inputs.absorbed)
+        given = shared, plan, how.single_scattering, mode.order, kernels, below, weight
         reflection, room, found = mode_slopes(*given, slopes, room, mode.above)
         if inputs.grounds is None:
             mean = mode.order.mean
@@ -271,6 +277,7 @@ def _reflectance_and_gradient(inputs, plan, how):
         grounds=of_grounds,
         weights=reflections,
         above=jax.tree.map(jnp.zeros_like, inputs.above),
+        absorbed=jax.tree.map(jnp.zeros_like, inputs.absorbed),
     )
     return value, gradient
 

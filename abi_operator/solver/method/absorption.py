@@ -59,11 +59,17 @@ class Absorbed(NamedTuple):
     lag: Vector | None
 
 
-def of_ground(ground: Bordered) -> Vector | None:
-    """y of the ground in the azimuthal mean; None in precisions that go without it."""
+def of_ground(ground: Bordered, absorbed: Float[Array, "*batch"] | None = None) -> Vector | None:
+    """y of the ground in the azimuthal mean; None in precisions that go without it.
+
+    Its matrix gives that but for rounding of numbers of order 1, which slopes under layers that
+    absorb nothing are as many times off by as those are deep: of a Lambertian ground it is known
+    better (`ground.absorbed_by_lambertian`).
+    """
     if ground.core.dtype != jnp.float32:
         return None
-    return ground @ isotropic(2 * ground.core.shape[0], jnp.ones_like(ground.diagonal))
+    one = isotropic(2 * ground.core.shape[0], jnp.ones_like(ground.diagonal))
+    return ground @ one if absorbed is None else absorbed.astype(jnp.float32) * one
 
 
 def of_layer(

@@ -47,15 +47,17 @@ def emitting_ground(
     one: Vector,
     radiance: Float[Array, "*batch"],
     planck: Float[Array, "*batch"],
+    absorbed: Float[Array, "*batch"] | None = None,
 ) -> Emission:
     r"""Ground that emits `radiance` isotropically under air of Planck function `planck`.
 
     :math:`e = E(1+Y)1 - 2BY1`; 0 for :math:`E = (1-a)B` over Lambertian ground. `returned` starts
-    as -1, the irradiance that keeps s = 0 over a black ground of radiance 1.
+    as -1, the irradiance that keeps s = 0 over a black ground of radiance 1. `absorbed` is what
+    is known of a Lambertian one (`absorption.of_ground`).
     """
     reflected = ground @ one
     column = radiance * one + (radiance - 2 * planck) * reflected
-    return Emission(column, -jnp.ones_like(radiance), of_ground(ground))
+    return Emission(column, -jnp.ones_like(radiance), of_ground(ground, absorbed))
 
 
 def add_layer(

@@ -1,5 +1,7 @@
 """The ground under the stack: its admittance and what it emits."""
 
+from typing import NamedTuple
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -7,6 +9,24 @@ from jaxtyping import Array, Float, Int
 from .bordered import Bordered, Vector
 from .quadrature import half_range
 from .surface import AnySurface
+
+
+class Grounds(NamedTuple):
+    """The ground in all azimuth modes.
+
+    Parameters
+    ----------
+    mean
+        Admittance in mode 0.
+    others
+        In modes 1, 2, ... on the first axis of every leaf; None is black.
+    absorbed
+        What a Lambertian one absorbs of isotropic light (`absorbed_by_lambertian`); None of others.
+    """
+
+    mean: Bordered
+    others: Bordered | None = None
+    absorbed: Float[Array, "*batch"] | None = None
 
 
 def isotropic(num_streams: int, beams: Float[Array, "beam *batch"]) -> Vector:
@@ -34,6 +54,11 @@ def lambertian(
     core = _identity(r.nodes.shape[0], albedo) - factor * r.nodes[:, None] * r.nodes[None]
     border = -factor * r.nodes[:, None] * r.beams[None]
     return Bordered(core, border, r.beams, -factor * r.beams[1:])
+
+
+def absorbed_by_lambertian(albedo: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+    r"""Y 1 of `lambertian` over 1: what is absorbed of isotropic light, :math:`(1-a)/(1+a)`."""
+    return (1 - albedo) / (1 + albedo)
 
 
 def black(beams: Float[Array, "beam *batch"], num_streams: int) -> Bordered:

@@ -3,12 +3,12 @@
 A stack's admittance falls as one over its depth where nothing is absorbed (`adding`), and is there
 a difference of numbers of order 1, of which single precision has what is absorbed beside it
 (`absorption`). So reflectances in single precision are as near at a depth of 1e5 as at 10, where
-quotients end by substitution (`machine.elimination.Pair`): with up to 16 streams. With more they
-are right to 2e-3 there. Slopes in a layer's depth and moments are sums of terms as many times as
-large as it is deep: of the change that doubling the depth makes, rounding leaves that many times
-1e-8 of the reflectance. Layers that stay (`staying`) go without what is absorbed: reflectances over
-and under them are right to 5e-4 at 1,000, and mean nothing from some 30,000 on. In double precision
-all are right to 1e-9 at 1e7.
+quotients end by substitution (`machine.elimination.Pair`), and slopes in what layers and ground
+absorb are as near, too (`refinement`). Slopes in a layer's depth and moments are sums of terms as
+many times as large as it is deep: of the change that doubling the depth makes, rounding leaves that
+many times 1e-8 of the reflectance. Layers that stay (`staying`) go without what is absorbed:
+reflectances over and under them are right to 5e-4 at 1,000, and mean nothing from some 30,000 on.
+In double precision all are right to 1e-9 at 1e7.
 
 That is the azimuthal mean's alone: no other mode keeps energy. Where an error budget allows for it
 (`skipping.budget.SINGLE_FROM`), values have all others in single precision, which holds twice as

@@ -154,7 +154,7 @@ def test_depth_without_absorption_is_right_or_refused(depth, right):
     with jax.enable_x64(True):
         double = np.asarray(toa_brf(*as_double(columns), num_streams=4))
     error = np.sort(abs(single / double - 1))
-    assert error[-1] < right and error[-2] < 4e-6
+    assert error[-1] < right and error[-2] < 2e-6
 
 
 @pytest.mark.float32
@@ -184,9 +184,13 @@ def test_what_nothing_absorbs_comes_back():
 
 
 @pytest.mark.float32
-@pytest.mark.parametrize(("depth", "right"), [(1e3, 5e-4), (1e5, 4e-2)])
+@pytest.mark.parametrize(("depth", "right"), [(1e3, 5e-6), (1e5, 1e-5), (9.9e5, 5e-4)])
 def test_what_little_absorption_takes_through_deep_layers(depth, right):
-    """Light of many scatterings: its slopes in ssa and albedo, of their largest."""
+    """Light of many scatterings: its slopes in ssa and albedo, of their largest.
+
+    Quotients and the ground's matrix alone, as elimination and its entries leave them, have a
+    hundredth at 1e5.
+    """
     columns = conservative_columns(depth)
     whole = lambda *x: jnp.sum(toa_brf(*x, num_streams=4))  # noqa: E731
     derivative = jax.grad(whole, argnums=(1, 3))

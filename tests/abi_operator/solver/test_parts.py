@@ -21,9 +21,11 @@ from abi_operator.solver.method.doublings import (
     start_coefficient,
     unknown_doublings,
 )
+from abi_operator.solver.method.ground import isotropic
 from abi_operator.solver.method.layer import half_layer
 from abi_operator.solver.method.legendre import associated_legendre, legendre_series
 from abi_operator.solver.method.quotient import minus_and_quotient, minus_quotient
+from abi_operator.solver.method.refinement import refined
 from abi_operator.solver.method.single_scatter import exact_single_scattering
 from abi_operator.solver.skipping.heat import emissivities
 
@@ -254,7 +256,7 @@ def test_quotients_of_positive_definite_matrices(n):
         np.testing.assert_allclose(slope, (above - below) / 2e-5, atol=1e-6 * scale)
 
 
-@pytest.mark.parametrize("n", [2, 3, 5, 8])
+@pytest.mark.parametrize("n", [2, 3, 5, 8, 10, 16])
 def test_a_small_eigenvalue_does_not_round_what_lies_across(n):
     """Of 1 beside 1e5, in single precision: of an inverse rounding of the one were as large."""
     rng = np.random.default_rng(n)
@@ -267,6 +269,42 @@ def test_a_small_eigenvalue_does_not_round_what_lies_across(n):
     found = np.asarray(jax.jit(lambda a, r: solve(a, [r])[0].joined())(a, right), float)
     found = 1e5 * np.einsum("ijb,jkb->ikb", others, found)
     np.testing.assert_allclose(found, across, atol=1e-5)  # an inverse: 6e-4 and more
+
+
+def test_quotients_are_right_along_isotropic_light():
+    """Where S is 1e-5 along it and 1 across: what elimination leaves there is 1e5 roundings."""
+    rng = np.random.default_rng(4)
+    nodes, columns = 3, 9
+    one = np.asarray(isotropic(2 * nodes, jnp.ones((2, columns))).nodes)
+    along = one[:, None] * one[None] / np.sum(one**2, axis=0)
+    others = np.eye(nodes)[..., None] - along
+    mixed = rng.normal(size=(nodes, nodes, columns))
+    mixed = np.einsum("ijb,jkb,lkb->ilb", others, mixed, mixed)
+    across = np.einsum("ijb,jkb->ikb", mixed, others)
+    borders = np.einsum("ijb,jkb->ikb", others, rng.normal(size=(nodes, 2, columns)))
+    little = rng.uniform(1, 2, (2, columns))
+
+    def matrix(core, little, border):
+        core = core + 1e-5 * little * along
+        border = border + (1e-5 * little - 1) * one[:, None] / np.sum(one**2, axis=0)
+        own = np.ones((2, columns))
+        return Bordered(*(jnp.asarray(x) for x in (core, border, own, own[1:])))
+
+    middle = matrix(others, little[0], borders)
+    right = matrix(across, little[1], 0.5 * borders)
+    acted = [x @ isotropic(2 * nodes, jnp.ones((2, columns))) for x in (middle, right)]
+
+    @jax.jit
+    def found(middle, right, acted):
+        _, plain = minus_and_quotient([(1.0, right)], right.corner[0], right, middle, right)
+        better = refined(plain, *acted)
+        return [(x.core.joined(), x.border.joined()) for x in (plain, better)]
+
+    exact, _ = found(middle, right, acted)
+    single = jax.tree.map(lambda x: x.astype(jnp.float32), (middle, right, acted))
+    for plain, better, x in zip(*found(*single), exact, strict=True):
+        wrong = [np.abs(np.asarray(y, float) - x).max() / np.abs(x).max() for y in (plain, better)]
+        assert wrong[1] < 1e-6 < 1e-4 < wrong[0]
 
 
 def test_an_entry_of_a_stack_is_read_by_the_kernel_it_is_given_to():
