@@ -142,7 +142,7 @@ def _radiance(lit: Lit, plan: Plan, how: How) -> Float[Array, "*batch"]:
     mean = first.weight * closed.reflection()[0] + emitted
     largest = 2 * jnp.abs(first.weight)  # weight of any other mode, but for its cosine
 
-    lowered = in_single_precision if how.rounds(plan, _num_nodes(lit)) else lambda x: x
+    lowered = in_single_precision if _rounded(lit, plan, how) else lambda x: x
     later, plan_of_later = lowered(lit), lowered(plan)
 
     def plus(total, mode, counts):
@@ -168,7 +168,7 @@ def _stacked(
     how: How,
 ) -> tuple[Bordered, Emission | None]:
     """All layers of a mode on the ground; only the mean has thermal light."""
-    rounded = how.rounds(plan, _num_nodes(lit))
+    rounded = _rounded(lit, plan, how)
 
     def put_on(below, air, jumps, doublings, odd, kernels, one, *number):
         # Of a layer that is the only one XLA would find no use for the number (`one_kernel`).
@@ -280,6 +280,11 @@ def _second_derivative(single_scattering, primals, tangents):
 
 def _every(lit: Lit) -> Mode:
     return every_mode(lit.ground, lit.grounds, lit.weights, lit.beams, _num_nodes(lit))
+
+
+def _rounded(lit: Lit, plan: Plan, how: How) -> bool:
+    """Whether values have all modes but the mean in single precision."""
+    return how.rounds(plan) and _num_nodes(lit) > WHOLE
 
 
 def _num_nodes(lit: Lit) -> int:

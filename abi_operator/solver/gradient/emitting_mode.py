@@ -97,7 +97,7 @@ def slopes_of_mode(
     """Answers of a mode, the fields at the top, and slopes, added to those in the air.
 
     The room (`room.Keeper.empty`) is given back filled. Without thermal light `jumps` and `column`
-    are None. Layers are read and written inside the kernels: see `mode`.
+    are None. What is `below`, and how layers are read and written inside the kernels: see `mode`.
     """
     num_layers, num_nodes = air.layers.tau.shape[0], air.layers.moments.shape[1]
     numbers = jnp.arange(num_layers, dtype=air.layers.tau.dtype)

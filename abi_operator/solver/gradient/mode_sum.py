@@ -137,7 +137,7 @@ def _plan(inputs: ModeSum, given: Given, how: How, slopes: bool = False) -> Plan
 
 def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *batch"]:
     num_nodes, num_beams = inputs.num_nodes, 1 + len(inputs.view_secants)
-    rounded = how.rounds(plan, num_nodes)
+    rounded = how.rounds(plan) and num_nodes > WHOLE
     lowered = in_single_precision if rounded else lambda x: x
 
     def reflection(mean: bool, mode: Mode, inputs: ModeSum, plan: Plan) -> Array:
@@ -221,7 +221,11 @@ def reflectance_and_gradient(
     Each column's slope is that of its own value. Slopes in the ground's cores are symmetric.
     `Doublings.most` must be given: there is room for so many.
     """
-    return _reflectance_and_gradient(inputs, _plan(inputs, given, how, slopes=True), how)
+    plan = _plan(inputs, given, how, slopes=True)
+    if inputs.above is not None or not how.rounds(plan):
+        return _reflectance_and_gradient(inputs, plan, how)
+    found = _reflectance_and_gradient(*in_single_precision((inputs, plan)), how)
+    return jax.tree.map(lambda x: x.astype(inputs.weights.dtype), found)
 
 
 def _reflectance_and_gradient(inputs, plan, how):

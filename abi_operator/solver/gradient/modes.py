@@ -45,9 +45,9 @@ class How(NamedTuple):
     most: int | None
     delta_m: bool = True
 
-    def rounds(self, plan: Plan, num_nodes: int) -> bool:
-        """Whether values have all modes but the mean in single precision (`method.rounding`)."""
-        return self.delta_m and num_nodes > WHOLE and budget.rounds(plan.error_budget)
+    def rounds(self, plan: Plan) -> bool:
+        """Whether single precision is enough (`method.rounding`)."""
+        return self.delta_m and budget.rounds(plan.error_budget)
 
 
 class Mode(NamedTuple):

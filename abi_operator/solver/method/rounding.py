@@ -11,11 +11,11 @@ reflectances over and under them are right to 5e-4 at 1,000, and mean nothing fr
 In double precision all are right to 1e-9 at 1e7.
 
 That is the azimuthal mean's alone: no other mode keeps energy. Where an error budget allows for it
-(`skipping.budget.SINGLE_FROM`), values have all others in single precision, which holds twice as
-many columns in a vector (`benchmarks/skipping.py`). Rounding grows there with a layer's depth, too,
-and nothing is seen as deep as `DEEPEST_ASIDE`, which no layer then exceeds. All of this needs
-delta-M: peaks that are cut off and not scaled away leave matrices that single precision has no sign
-for, and such columns stay in double precision.
+(`skipping.budget.SINGLE_FROM`), values have all others in single precision, and slopes the mean,
+too, which holds twice as many columns in a vector (`benchmarks/skipping.py`). Rounding grows in
+other modes of values with a layer's depth, too, and nothing is seen as deep as `DEEPEST_ASIDE`,
+which no layer then exceeds. All of this needs delta-M: peaks that are cut off and not scaled away
+leave matrices that single precision has no sign for, and such columns stay in double precision.
 """
 
 from typing import TypeVar

@@ -1,5 +1,6 @@
-"""Modes in single precision, where an error budget has room for it."""
+"""Modes of values, and slopes, in single precision, where an error budget has room for it."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -48,6 +49,29 @@ def test_values_are_rounded_and_next_to_nothing_is_lost(door, given, monkeypatch
     assert rounded.dtype == double.dtype == np.float64
     assert 1e-9 < np.median(error) < 3e-6  # eps of float32 is 1.2e-7
     assert error.max() < 1e-4
+
+
+def test_slopes_are_rounded_and_next_to_nothing_is_lost(monkeypatch):
+    """Of the norm of all slopes of a column."""
+    names = "tau", "ssa", "moments", "albedo", "mu0", "mu"
+
+    def slopes(error_budget):
+        def total(some):
+            how = {"num_streams": STREAMS, "error_budget": error_budget}
+            return toa_brf(**columns() | some, **how).sum()
+
+        return jax.grad(total)({name: columns()[name] for name in names})
+
+    rounded = slopes(BUDGET)
+    monkeypatch.setattr(budget, "SINGLE_FROM", np.inf)
+    found = [
+        np.concatenate([np.reshape(s[name], (64, -1)) for name in names], axis=1)
+        for s in (rounded, slopes(NEXT))
+    ]
+    assert all(x.dtype == np.float64 for x in found)
+    error = np.linalg.norm(found[0] - found[1], axis=1) / np.linalg.norm(found[1], axis=1)
+    assert 1e-9 < np.median(error) < 2e-6
+    assert error.max() < 1e-4, error.max()
 
 
 @pytest.mark.parametrize("ssa", [0.9, 1.0])
