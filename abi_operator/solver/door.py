@@ -154,8 +154,11 @@ class _Program(NamedTuple):
         return tile_size(self.options.num_streams, dtype, self._rounds(what))
 
     def _rounds(self, what: Any) -> bool:
-        options = self.options
-        return what == "value" and options.delta_m and budget.rounds(options.error_budget)
+        """Whether most is solved in single precision: not slopes of what emits, or of layers
+        between others that stay."""
+        in_sunlight = {"solar_irradiance", "around"}.isdisjoint(names(self.structure))
+        rounds = self.options.delta_m and budget.rounds(self.options.error_budget)
+        return rounds and (what == "value" or in_sunlight)
 
     @property
     def need(self) -> Callable[[Leaves], Array] | None:

@@ -30,10 +30,10 @@ class Settings(NamedTuple):
     error_budget
         Relative error of the reflectance (of 0.01 where it is less, in 99 of 100 columns) that may
         be made on top of what the streams leave: layers that are alike are solved as one, azimuth
-        modes and doublings end where the rest is less, values have most modes in single precision
-        from 1e-4 on, and where hardly anything is scattered nothing is solved (`skipping`). 1e-3 is
-        a good one. None solves everything, and so do second derivatives, and of columns that emit
-        derivatives, several views, and grounds other than Lambertian.
+        modes and doublings end where the rest is less, single precision does from 1e-4 on, and
+        where hardly anything is scattered nothing is solved (`skipping`). 1e-3 is a good one. None
+        solves everything, and so do second derivatives, and of columns that emit derivatives,
+        several views, and grounds other than Lambertian.
     check_values
         Whether to refuse values out of range (`ranges.SOLVER`; see `checks`). None checks what lies
         in memory, which takes a hundredth of the time that solving does: not what is traced inside

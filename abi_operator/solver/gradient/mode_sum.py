@@ -188,7 +188,10 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
     every = inputs.every_mode()
     later, plan_of_later = lowered(inputs), lowered(plan)
     first = jax.tree.map(lambda x: x[0], every)
-    total = first.weight * reflection(True, first, inputs, plan)
+    # Layers that stay go without what they absorb, which single precision needs in the mean.
+    stay = inputs.above is not None
+    of_mean = (first, inputs, plan) if stay else (lowered(first), later, plan_of_later)
+    total = first.weight * reflection(True, *of_mean).astype(first.weight.dtype)
     return over_modes(another, total, every, 1, None, plan)[0]
 
 

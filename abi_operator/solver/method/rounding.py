@@ -10,12 +10,13 @@ many times 1e-8 of the reflectance. Layers that stay (`staying`) go without what
 reflectances over and under them are right to 5e-4 at 1,000, and mean nothing from some 30,000 on.
 In double precision all are right to 1e-9 at 1e7.
 
-That is the azimuthal mean's alone: no other mode keeps energy. Where an error budget allows for it
-(`skipping.budget.SINGLE_FROM`), values have all others in single precision, and slopes the mean,
-too, which holds twice as many columns in a vector (`benchmarks/skipping.py`). Rounding grows in
-other modes of values with a layer's depth, too, and nothing is seen as deep as `DEEPEST_ASIDE`,
-which no layer then exceeds. All of this needs delta-M: peaks that are cut off and not scaled away
-leave matrices that single precision has no sign for, and such columns stay in double precision.
+Where an error budget allows for it (`skipping.budget.SINGLE_FROM`) values in sunlight and slopes
+are solved in single precision, which holds twice as many columns in a vector
+(`benchmarks/skipping.py`). The mean of columns that emit, and that between layers that stay, are
+not. What is absorbed counts in the mean alone: no other mode keeps energy. Rounding grows in other
+modes of values with a layer's depth, too, and nothing is seen as deep as `DEEPEST_ASIDE`, which no
+layer then exceeds. All of this needs delta-M: peaks that are cut off and not scaled away leave
+matrices that single precision has no sign for, and such columns stay in double precision.
 """
 
 from typing import TypeVar

@@ -9,8 +9,8 @@ expected to be less than b times `OF_NO_MODES` (`mode_sum`). A layer's doublings
 `OF_DOUBLINGS` of its own response (`doublings`). A column that misses at most b times `OF_FAINT`
 without any of this is not solved (`faint`). These shares were fitted by
 `benchmarks/fit_budget.py` on columns of other seeds than those that `benchmarks/skipping.py` judges
-them by, so that the worst of five seeds leaves a third of the budget. From `SINGLE_FROM` on slopes
-and all modes of values but the mean are solved in single precision, which leaves next to nothing.
+them by, so that the worst of five seeds leaves a third of the budget. From `SINGLE_FROM` on
+single precision is enough (`method.rounding`), which leaves next to nothing.
 
 Groups and modes are each column's own. Of doublings a layer has as many as that column of its tile
 asks for that needs most: what a column gets depends on those that it is solved with by about a
@@ -56,8 +56,7 @@ FORWARD, BACKWARD = 0.75, 0.05
 modes are small by chance: forwards, over the number of streams (delta-M leaves 1 of an endlessly
 sharp one, 0.5 of g = 0.85 at 8 streams), and backwards, of a moment below 0."""
 SINGLE_FROM = 1e-4
-"""Budget from which values have all modes but the mean in single precision, and slopes the mean,
-too (`method.rounding`)."""
+"""Budget from which single precision is enough (`method.rounding`)."""
 OF_SLOPES = 2e-3
 """The budget of programs for slopes, at most: a column's slopes keep about 1 % whatever else."""
 THICKEST = 2.0
