@@ -140,6 +140,6 @@ def _warm(
         least=sun * known.least + thermal,
         dark=sun * known.dark,
         aside=sun * known.aside,
-        through=known.through,
+        through=sun * known.through,
     )
     return jax.lax.stop_gradient(Warm(of_light, light, levels, albedo * seen))

@@ -32,8 +32,9 @@ class Settings(NamedTuple):
         be made on top of what the streams leave: layers that are alike are solved as one, azimuth
         modes and doublings end where the rest is less, single precision does from 1e-4 on, and
         where hardly anything is scattered nothing is solved (`skipping`). 1e-3 is a good one. None
-        solves everything, and so do second derivatives, and of columns that emit derivatives,
-        several views, and grounds other than Lambertian.
+        solves everything, and so do second derivatives, and of columns that emit several views at
+        once, and grounds other than Lambertian; slopes of columns that emit are those of every
+        layer.
     check_values
         Whether to refuse values out of range (`ranges.SOLVER`; see `checks`). None checks what lies
         in memory, which takes a hundredth of the time that solving does: not what is traced inside

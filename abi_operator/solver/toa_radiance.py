@@ -45,7 +45,8 @@ def toa_radiance(
     ----------
     tau, ssa, moments, albedo, mu0, mu, relative_azimuth
         As in `toa_brf`. Where `solar_irradiance` is 0 the sun may stand anywhere, below the horizon
-        too; the derivative in the irradiance is that of the sun's place for mu0 of 0.001 or more.
+        too; the derivative in the irradiance is that of the sun's place for mu0 of 0.001 or more,
+        and within an error budget the azimuthal mean's.
     solar_irradiance
         F0, on a plane across the beam. [radiance unit sr]
     planck_levels

@@ -8,7 +8,8 @@ of the mean's Y and e at the top (`method.adding`), but for the Planck function 
 is added outside. So there is one adjoint field a mode for both lights, and in the mean the source
 is that of both together (`emitting_mode`): thermal light costs the gradient a few vectors.
 
-An error budget is spent on values (`skipping`); slopes are those of every layer and every mode.
+Within an error budget (`skipping`) slopes are those of every layer, whose light a group's would not
+tell, in the azimuth modes that count.
 """
 
 from functools import partial
@@ -27,6 +28,7 @@ from ..method.ground import isotropic
 from ..method.layer import half_layer
 from ..method.mode_layers import read
 from ..method.rounding import as_deep_as_seen, in_single_precision
+from ..skipping import budget
 from ..skipping.heat import Warm, lost
 from ..skipping.merging import summed
 from ..skipping.plan import LayersOfModes, Plan, everything, over_layers, over_modes, planned
@@ -101,21 +103,22 @@ def radiance(lit: Lit, given: Given, how: How) -> Float[Array, "*batch"]:
     return added + (one_kernel(value, num_nodes) if num_nodes <= WHOLE else value)(lit, plan)
 
 
-def _plan(lit: Lit, given: Given, how: How) -> Plan:
-    layers, warm = lit.air.layers, given.warm
-    moments = layers.moments.reshape(2, -1, *layers.moments.shape[1:])
-    of_modes = LayersOfModes(layers.tau, layers.coalbedo, layers.sun_secant, (*moments,))
+def _plan(lit: Lit, given: Given, how: How, slopes: bool = False) -> Plan:
+    """What is solved; of layers that slopes are wanted of each by itself."""
+    warm = given.warm
     if warm is None:
-        return everything(of_modes, given.doublings)
+        return everything(_of_modes(lit), given.doublings)
     assert how.error_budget is not None
-    return planned(
-        of_modes,
-        lit.air.view_secants[:1],
-        warm.known,
-        how.error_budget,
-        how.most,
-        warm=warm,
-    )
+    error_budget = min(how.error_budget, budget.OF_SLOPES) if slopes else how.error_budget
+    secants = lit.air.view_secants[:1]
+    limits = warm.known, error_budget, how.most
+    return planned(_of_modes(lit), secants, *limits, warm=warm, merges=not slopes)
+
+
+def _of_modes(lit: Lit) -> LayersOfModes:
+    layers = lit.air.layers
+    moments = layers.moments.reshape(2, -1, *layers.moments.shape[1:])
+    return LayersOfModes(layers.tau, layers.coalbedo, layers.sun_secant, (*moments,))
 
 
 def _in_groups(lit: Lit, warm: Warm | None, plan: Plan) -> tuple[Lit, Float[Array, "*batch"]]:
@@ -140,8 +143,7 @@ def _radiance(lit: Lit, plan: Plan, how: How) -> Float[Array, "*batch"]:
     closed, nothing = top(stack), jnp.zeros_like(lit.heating.above)
     emitted = closed.emerging(light, one, 0.5 * lit.heating.above, nothing)[1]
     mean = first.weight * closed.reflection()[0] + emitted
-    largest = 2 * jnp.abs(first.weight)  # weight of any other mode, but for its cosine
-
+    largest = _largest(lit)
     lowered = in_single_precision if _rounded(lit, plan, how) else lambda x: x
     later, plan_of_later = lowered(lit), lowered(plan)
 
@@ -153,7 +155,6 @@ def _radiance(lit: Lit, plan: Plan, how: How) -> Float[Array, "*batch"]:
         total = total + counts * mode.weight * reflection
         if plan.error_budget is None:
             return total, None, None
-        # Whatever the azimuth: where the cosine of this mode is small that of the next is not.
         return total, None, plan.share(total[None], counts * largest * jnp.abs(reflection))
 
     return over_modes(plus, mean, every, 1, None, plan)[0]
@@ -214,23 +215,30 @@ def _of_ground(lit: Lit) -> Emission:
 @partial(radiance.defjvp, symbolic_zeros=True)
 def _radiance_jvp(how, primals, tangents):
     lit, given = primals
-    value, gradient = radiance_and_gradient(lit, given.doublings, how.single_scattering)
+    value, gradient = radiance_and_gradient(lit, given, how)
     return value, along(gradient, tangents[0], value)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
-def radiance_and_gradient(
-    lit: Lit, doublings: Doublings, single_scattering: bool
-) -> tuple[Float[Array, "*batch"], Lit]:
+def radiance_and_gradient(lit: Lit, given: Given, how: How) -> tuple[Float[Array, "*batch"], Lit]:
     """`radiance` and its slope in every input.
 
     Each column's slope is that of its own value. Slopes in the ground's cores are symmetric.
     `Doublings.most` must be given: there is room for so many.
     """
+    plan = _plan(lit, given, how, slopes=True)
+    if not how.rounds(plan):
+        return _radiance_and_gradient(lit, plan, how)
+    found = _radiance_and_gradient(*in_single_precision((lit, plan)), how)
+    return jax.tree.map(lambda x: x.astype(lit.weights.dtype), found)
+
+
+def _radiance_and_gradient(lit: Lit, plan: Plan, how: How) -> tuple[Float[Array, "*batch"], Lit]:
+    doublings, largest = plan.doublings, _largest(lit)
     if doublings.most is None:
         raise TypeError("slopes need a largest number of doublings.")
 
-    def step(carry, mode):
+    def one(carry, mode, counts):
         value, slopes, of_mean, room = carry
         # Thermal light is the same in all azimuths: there is none in any mode but the mean.
         mean, ground = mode.order.mean, mode.below(lit.ground)
@@ -239,12 +247,12 @@ def radiance_and_gradient(
             lit.air,
             jumps,
             doublings,
-            single_scattering,
+            how.single_scattering,
             mode.order,
             mode.kernels(),
             (ground, of_ground(ground, lit.absorbed)),
             column,
-            radiance_at_the_top(above, mode.weight),
+            radiance_at_the_top(above, counts * mode.weight),
             slopes,
             room,
         )
@@ -254,13 +262,22 @@ def radiance_and_gradient(
         new = found.ground if lit.grounds is None else None, heating
         of_mean = jax.tree.map(lambda x, new: x + mean * new, of_mean, new)
         own = None if lit.grounds is None else found.ground
-        value = value + mode.weight * reflection + emitted
-        return (value, found.air, of_mean, room), (reflection, found.beams, own)
+        value = value + counts * mode.weight * reflection + emitted
+        carry, row = (value, found.air, of_mean, room), (counts * reflection, found.beams, own)
+        if plan.error_budget is None:
+            return carry, row, None
+        of_slopes = plan.share_of_slopes(found.square, found.air.layers.tau)
+        of_value = plan.share(value[None], counts * largest * jnp.abs(reflection))
+        share = jnp.maximum(of_slopes, of_value)
+        # The mean is never the last by chance.
+        return carry, row, jnp.where(mean > 0, jnp.full_like(share, jnp.inf), share)
 
     mean = lit.ground if lit.grounds is None else None, lit.heating
     nothing = jax.tree.map(jnp.zeros_like, (lit.heating.above, lit.air, mean))
     space = Keeper(lit.air.layers.tau, _num_nodes(lit), doublings.most, warm=True).empty()
-    carry, rows = jax.lax.scan(step, (*nothing, space), _every(lit))
+    every = _every(lit)
+    rows = lit.weights, lit.beams, every.ground
+    carry, rows = over_modes(one, (*nothing, space), every, 0, rows, plan)
     (value, air, (ground, heating), _), (reflections, beams, grounds) = carry, rows
     if grounds is not None:
         ground, grounds = (jax.tree.map(lambda x, i=i: x[i], grounds) for i in (0, LATER))
@@ -269,13 +286,21 @@ def radiance_and_gradient(
 
 
 @radiance_and_gradient.defjvp
-def _second_derivative(single_scattering, primals, tangents):
-    lit, doublings = primals
+def _second_derivative(how, primals, tangents):
+    """JAX's own, of the program that solves everything with its doublings written out."""
+    lit, given = primals
+    doublings = given.doublings.written_out()
 
     def written_out(lit):
-        return radiance_and_gradient.fun(lit, doublings.written_out(), single_scattering)
+        return _radiance_and_gradient(lit, everything(_of_modes(lit), doublings), how)
 
     return jax.jvp(written_out, (lit,), tangents[:1])
+
+
+def _largest(lit: Lit) -> Float[Array, "*batch"]:
+    """Weight of any mode but the mean, whatever the azimuth: where the cosine of one is small that
+    of the next is not."""
+    return 2 * jnp.abs(lit.weights[0])
 
 
 def _every(lit: Lit) -> Mode:

@@ -21,7 +21,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced, matmul
+from ...machine.algebra import fenced, matmul, total
 from ...machine.kernels import one_kernel
 from ..method.adding import top
 from ..method.bordered import Bordered, Vector
@@ -66,8 +66,9 @@ class Air(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Of one mode, in what its beams are made of, in its ground and in e there; of it and those
-    before it, in the air. None in place of slopes in thermal light where there is none.
+    """Of one mode, in what its beams are made of, in its ground and in e there, and the sum of the
+    squares of its own in the layers' moments; of it and those before it, in the air. None in place
+    of slopes in thermal light where there is none.
     """
 
     air: Air
@@ -75,6 +76,7 @@ class Slopes(NamedTuple):
     ground: Bordered
     column: Vector
     jumps: Float[Array, "layer *batch"] | None
+    square: Float[Array, "*batch"]
 
 
 AtTheTop = Callable[[Bordered, Any], tuple[Any, Fields]]
@@ -154,11 +156,12 @@ def slopes_of_mode(
     def down(above, number):
         return undo_one(above, air, jumps, doublings, room, number, order, kernels), None
 
-    nothing = jnp.zeros_like(kernels[0].beams), jnp.zeros_like(kernels[1].beams)
+    beams = jnp.zeros_like(kernels[0].beams), jnp.zeros_like(kernels[1].beams)
+    nothing = *beams, jnp.zeros_like(air.layers.tau[0])
     above = fields, nothing, slopes, jax.tree.map(jnp.zeros_like, jumps)
-    (at_bottom, beams, slopes, of_jumps), _ = jax.lax.scan(down, above, numbers)
+    (at_bottom, (*beams, square), slopes, of_jumps), _ = jax.lax.scan(down, above, numbers)
     of_ground = pair(1.0, [at_bottom]), _slope_of_column(at_bottom)
-    return answers, fields, room, Slopes(slopes, beams, *of_ground, of_jumps)
+    return answers, fields, room, Slopes(slopes, (*beams,), *of_ground, of_jumps, square)
 
 
 def _read(
@@ -203,4 +206,5 @@ def _collected(step, tau, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
     sun, view = h * (a.secants + b.secants)
     beams = totals[0] + h * a.beams, totals[1] + h * b.beams
     slopes = Layer(step * (a.h + b.h), h * coalbedo, sun, h * a.moments, h * b.moments)
-    return beams, slopes, view
+    square = totals[2] + total(slopes.even**2) + total(slopes.odd**2)
+    return (*beams, square), slopes, view

@@ -12,8 +12,8 @@ In double precision all are right to 1e-9 at 1e7.
 
 Where an error budget allows for it (`skipping.budget.SINGLE_FROM`) values in sunlight and slopes
 are solved in single precision, which holds twice as many columns in a vector
-(`benchmarks/skipping.py`). The mean of columns that emit, and that between layers that stay, are
-not. What is absorbed counts in the mean alone: no other mode keeps energy. Rounding grows in other
+(`benchmarks/skipping.py`). The mean is not in values of columns that emit, nor between layers that
+stay. What is absorbed counts in the mean alone: no other mode keeps energy. Rounding grows in other
 modes of values with a layer's depth, too, and nothing is seen as deep as `DEEPEST_ASIDE`, which no
 layer then exceeds. All of this needs delta-M: peaks that are cut off and not scaled away leave
 matrices that single precision has no sign for, and such columns stay in double precision.

@@ -13,7 +13,8 @@ mode until it counts less than the budget b times the reflectance R; s is the su
 Every other number of groups begins with the columns of most modes, so that a tile of two numbers
 has columns that are alike in their modes. The order only costs time where it is wrong, and with few
 streams (`SORTED_FROM`) it costs more than it saves. Of slopes more groups are made, and other
-columns need most of them: their order is one of its own.
+columns need most of them: their order is one of its own, and that of columns that emit, of which
+slopes are solved layer by layer, one of modes alone.
 """
 
 import jax
@@ -55,8 +56,6 @@ def need(
     of_groups, thickest = error_budget, float("inf")
     if slopes:
         of_groups, thickest = min(error_budget, budget.OF_SLOPES), budget.THICKEST
-    allowed = budget.OF_MERGING * of_groups * known.least * jnp.minimum(mu0 + mu, 1)
-    labels = group_labels(alike, Limits(0.5 * secants, allowed, thickest))
     depth = jnp.sum(alike.scattered * alike.tau, axis=0)
     twice = (depth / (1 + depth)) ** 2 * secants / (error_budget * known.least)
     if alike.light is not None:
@@ -64,5 +63,8 @@ def need(
     tangents = jnp.sqrt((1 - mu0) / (1 + mu0) * (1 - mu) / (1 + mu))
     modes = jnp.log(jnp.maximum(twice, 1)) / -jnp.log(jnp.clip(tangents, _STRAIGHT, 1 - _STRAIGHT))
     share = modes / (1 + modes)
-    groups = labels[-1]
+    if slopes and alike.light is not None:
+        return share  # all their layers are solved
+    allowed = budget.OF_MERGING * of_groups * known.least * jnp.minimum(mu0 + mu, 1)
+    groups = group_labels(alike, Limits(0.5 * secants, allowed, thickest))[-1]
     return groups + jnp.where(groups % 2 == 0, share, 1 - share)

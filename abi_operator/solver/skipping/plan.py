@@ -132,6 +132,7 @@ def planned(
     most: int | None,
     thickest: float = float("inf"),
     warm: Warm | None = None,
+    merges: bool = True,
 ) -> Plan:
     """What an error budget asks for.
 
@@ -149,6 +150,8 @@ def planned(
         Optical depth on the way down and up that no group exceeds. [-]
     warm
         What is known of columns that emit.
+    merges
+        Whether layers are merged into groups.
     """
     given, groups, peaked = layers, None, peaked_columns(layers)
     if known.peaked is not None:
@@ -156,7 +159,7 @@ def planned(
     # Few moments of such a phase function are as much below 0 as above: light scattered once, of
     # the whole function, says nothing of the rest.
     least = jnp.where(peaked > 1, known.dark, known.least)
-    if layers.tau.shape[0] > 1:
+    if merges and layers.tau.shape[0] > 1:
         secant = 0.5 * (layers.sun_secants[0] + jnp.max(view_secants, axis=0))
         allowed = budget.OF_MERGING * error_budget * least
         # Of reflectances that are large by 1 / (mu0 + mu), where sun and view graze, as a loss is.
