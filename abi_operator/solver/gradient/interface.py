@@ -19,14 +19,13 @@ diagonal, which is rebuilt from the co-albedo (`method.layer.conservative`), tak
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, product, total
 from ..method.bordered import Bordered
 from ..method.layer import ModeKernels
 from ..method.mode_layers import Order
-from ..method.quadrature import half_range
+from ..method.quadrature import half_range, node_scales
 from .fields import Fields, swapped
 from .pull_back import on_nodes
 
@@ -88,8 +87,7 @@ def _of_diffuse(seen, beams, own):
 
 def _without_diagonal(slopes, nodes, fields):
     """The mean's slopes: its diagonal is formed from the other entries of its row."""
-    mu, weight = half_range(2 * nodes.shape[0])
-    s = np.sqrt(weight * mu).tolist()
+    s = node_scales(2 * nodes.shape[0]).tolist()
 
     @fenced
     def without(slopes, nodes, fields):

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from ...machine.algebra import fenced, kernel_of_product, matmul, product, total
 from ..method.bordered import Bordered
 from ..method.layer import ModeKernels
-from ..method.quadrature import half_range
+from ..method.quadrature import half_range, node_scales
 from .fields import Edge, edge, swapped
 
 
@@ -100,10 +100,10 @@ def _undo_inverse(pairs, nodes, beams, moments, p: Edge, p_bar: Edge, cores, cor
 
 def _undo_diagonal(core, coalbedo, mean):
     """The core's cotangent, the co-albedo's slope, and the constants' own part of the product."""
-    mu, weight = half_range(2 * core.shape[0])
+    mu = half_range(2 * core.shape[0])[0]
     expand = (-1,) + (1,) * (core.ndim - 2)
     inverse_mu = np.asarray(1 / mu, core.dtype).reshape(expand)
-    s = np.sqrt(weight * mu)
+    s = node_scales(2 * core.shape[0])
     ratio = np.asarray(s[None] / s[:, None], core.dtype).reshape(mu.size, *expand)
     eye = np.eye(mu.size, dtype=bool).reshape(mu.size, *expand)
 

@@ -36,12 +36,11 @@ alone, so that the slope in h is found as without thermal light.
 from typing import NamedTuple
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, kernel_of_product, matmul, product, total
 from ..method.bordered import Bordered, Vector
-from ..method.quadrature import half_range
+from ..method.quadrature import node_scales
 from ..method.quotient import Quotient
 from .fields import Fields, Heat, pair
 
@@ -123,9 +122,8 @@ def _on_isotropic(border, diagonal, root):
 
 def isotropic_nodes(like: Float[Array, "node _ *batch"]) -> Float[Array, "node 1 *#batch"]:
     """Nodes of the vector 1."""
-    mu, weight = half_range(2 * like.shape[0])
-    root = np.sqrt(weight * mu).reshape(-1, *(1,) * (like.ndim - 1))
-    return jnp.asarray(root, like.dtype)
+    scales = node_scales(2 * like.shape[0])
+    return jnp.asarray(scales.reshape(-1, *(1,) * (like.ndim - 1)), like.dtype)
 
 
 def start_of_lag(h: Float[Array, "*batch"], fraction: Bordered) -> Vector:

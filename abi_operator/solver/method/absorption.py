@@ -40,7 +40,7 @@ from .bordered import Bordered, Vector, combined
 from .doublings import Doublings, repeated
 from .ground import isotropic
 from .layer import rational_start
-from .quadrature import half_range
+from .quadrature import half_range, node_scales
 from .quotient import Quotient, minus_and_quotient
 
 
@@ -218,5 +218,5 @@ def _absorbing_border(border, missing):
 
 def _isotropic(like):
     """Nodes of the vector 1, and their shape with a batch."""
-    mu, weight = half_range(2 * like.shape[0])
-    return np.sqrt(weight * mu), (like.shape[0], *(1,) * (like.ndim - 2))
+    scales = node_scales(2 * like.shape[0])
+    return scales, (scales.size, *(1,) * (like.ndim - 2))

@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .bordered import Bordered, Vector
-from .quadrature import half_range
+from .quadrature import half_range, node_scales
 from .surface import AnySurface
 
 
@@ -31,10 +30,9 @@ class Grounds(NamedTuple):
 
 def isotropic(num_streams: int, beams: Float[Array, "beam *batch"]) -> Vector:
     r"""Radiance 1 in all directions: :math:`\sqrt{w\mu}` at the nodes, 1 at the beams."""
-    mu, weight = half_range(num_streams)
-    shape = (mu.size,) + (1,) * (beams.ndim - 1)
-    nodes = jnp.asarray(np.sqrt(weight * mu), beams.dtype).reshape(shape)
-    return Vector(jnp.broadcast_to(nodes, (mu.size, *beams.shape[1:])), jnp.ones_like(beams))
+    scales = node_scales(num_streams)
+    nodes = jnp.asarray(scales, beams.dtype).reshape(-1, *(1,) * (beams.ndim - 1))
+    return Vector(jnp.broadcast_to(nodes, (scales.size, *beams.shape[1:])), jnp.ones_like(beams))
 
 
 def _identity(num_nodes: int, like: Float[Array, "*batch"]) -> Float[Array, "node node *#batch"]:

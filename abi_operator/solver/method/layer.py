@@ -30,7 +30,7 @@ from ...machine.algebra import matmul, total, weighted_sum
 from .bordered import Bordered, combined
 from .doublings import Doublings, repeated
 from .legendre import associated_legendre
-from .quadrature import half_range
+from .quadrature import half_range, node_scales
 from .quotient import minus_quotient
 
 
@@ -102,9 +102,9 @@ def conservative(matrix: Bordered, coalbedo: Float[Array, "*batch"]) -> Bordered
     minus the other entries keeps a co-albedo far below the rounding error of 1 - ssa P.
     """
     num_nodes = matrix.core.shape[0]
-    mu, weight = half_range(2 * num_nodes)
+    mu = half_range(2 * num_nodes)[0]
     expand = (num_nodes,) + (1,) * coalbedo.ndim
-    s = jnp.asarray(np.sqrt(weight * mu), coalbedo.dtype).reshape(expand)
+    s = jnp.asarray(node_scales(2 * num_nodes), coalbedo.dtype).reshape(expand)
     diagonal = jnp.eye(num_nodes, dtype=bool).reshape(*expand[:1], *expand)
     others = jnp.where(diagonal, 0, matrix.core)
     row_sum = coalbedo / jnp.asarray(mu, coalbedo.dtype).reshape(expand)

@@ -62,6 +62,13 @@ def half_range(num_streams: int) -> tuple[np.ndarray, np.ndarray]:
     return _rule(num_streams, 1 - 1 / (0.30574 * n + 0.5015 + 0.0613 / n))
 
 
+def node_scales(num_streams: int) -> np.ndarray:
+    r""":math:`\sqrt{w\mu}`, by which nodes are scaled (`bordered`), float64: what radiance 1 of all
+    directions is there. [-]"""
+    mu, weight = half_range(num_streams)
+    return np.sqrt(weight * mu)
+
+
 def double_gauss(num_streams: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss-Legendre nodes and weights on (0, 1), which other solvers use: as `half_range`."""
     return _rule(num_streams, 0.0)

@@ -20,13 +20,12 @@ along 1 until that holds, an equation a column of N. Slopes alone need it (`grad
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from ...machine.algebra import Rows, fenced, total
 from .bordered import Bordered, Vector
 from .ground import isotropic
-from .quadrature import half_range
+from .quadrature import node_scales
 from .quotient import Quotient
 
 
@@ -57,12 +56,12 @@ def _missing(wanted, blocks, nodes, passed=None):
     terms = [row * nodes[k] for k, row in enumerate(rows)]
     if passed is not None:
         terms.append(passed[0] * passed[1])
-    one = [float(x) * nodes[k] for k, x in enumerate(_of_nodes(len(rows)))]
+    one = [float(x) * nodes[k] for k, x in enumerate(node_scales(2 * len(rows)))]
     return (wanted - total(terms)) / total(one)
 
 
 def _moved(blocks, missing):
-    moved, start, one = [], 0, _of_nodes(sum(len(x) for x in blocks))
+    moved, start, one = [], 0, node_scales(2 * sum(len(x) for x in blocks))
     for block in blocks:
         own = one[start : start + len(block)].reshape(-1, *(1,) * (block.ndim - 1))
         moved.append(_plus(block, own.astype(block.dtype), missing))
@@ -73,8 +72,3 @@ def _moved(blocks, missing):
 @fenced
 def _plus(block, own, missing):
     return block + own * missing
-
-
-def _of_nodes(num_nodes):
-    mu, weight = half_range(2 * num_nodes)
-    return np.sqrt(weight * mu)
