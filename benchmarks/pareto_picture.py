@@ -1,7 +1,16 @@
 """The picture of `pareto`: error across, microseconds a column up, a panel for each workload.
 
-Needs matplotlib, which the extra `plot` brings.
+    python benchmarks/pareto_picture.py [benchmarks/results/pareto.md] [--out pareto.png]
+
+draws what stands in the tables of a page, of which every heading names its workload; `pareto.py
+--picture` draws its own run, with the settings that were tried for others. Needs matplotlib, which
+the extra `plot` brings.
 """
+
+import argparse
+import re
+from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib
 
@@ -10,7 +19,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
+from pareto_report import Line
 
+PAGE = Path(__file__).parent / "results" / "pareto.md"
 COLOURS = {
     "ours": "#c1272d",
     "nanodisort": "#1f5fa8",
@@ -48,10 +59,33 @@ def draw(report, path):
     for axis in (x for x in axes.flat if x.get_visible()):
         axis.set_xlabel("error of BRF at the 99th percentile [-]")
     solvers = [x for x in COLOURS if any(line.solver == x for line in report.lines)]
-    figure.legend(handles=_legend(solvers), loc="center right", frameon=False, fontsize=10)
+    figure.legend(
+        handles=_legend(solvers, bool(report.points)),
+        loc="center right",
+        frameon=False,
+        fontsize=10,
+    )
     figure.tight_layout(rect=(0, 0, 1 - 3.1 / size[0], 1))
     figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def lines_of(page):
+    """Lines of the tables of a page, with one time and one error each: the median, and p99."""
+    found, workload = [], ""
+    for text in page.splitlines():
+        heading = re.match(r"#+ .*\b(W\d)\b", text)
+        workload = heading[1] if heading else workload
+        cells = [x.strip() for x in text.strip("|").split(" | ")]
+        if cells[0] not in ("forward", "gradient") or len(cells) != 11:
+            continue
+        kind, budget, rows, solver, setting, count, micro, _, _, p99, _ = cells
+        times, errors = [float(micro.replace(",", ""))], np.asarray([float(p99)])
+        rows = rows.replace(", ", "")
+        found.append(
+            Line(workload, kind, float(budget), rows, solver, setting, int(count), times, errors)
+        )
+    return found
 
 
 def _panel(axis, report, kind, workload):
@@ -92,10 +126,26 @@ def _style(solver):
     return {"c": colour, "fillstyle": "none" if hollow else "full", **edge}
 
 
-def _legend(solvers):
+def _legend(solvers, tried):
     kinds = {"s": "ours, nothing skipped", "*": "ours, skipping", "o": "others, nothing skipped"}
     kinds["v"] = "others, merged layers and early stop"
     shown = [Line2D([], [], ls="", marker="o", ms=8, label=x, **_style(x)) for x in solvers]
     shown += [Line2D([], [], ls="", marker=m, ms=8, c="0.35", label=x) for m, x in kinds.items()]
-    small = Line2D([], [], ls="", marker="o", ms=3.5, c="0.35", alpha=0.5, label="settings tried")
-    return [*shown, small, Line2D([], [], c="0.55", ls="--", label="error to be met")]
+    small = {"marker": "o", "ms": 3.5, "c": "0.35", "alpha": 0.5, "label": "settings tried"}
+    shown += [Line2D([], [], ls="", **small)] if tried else []
+    return [*shown, Line2D([], [], c="0.55", ls="--", label="error to be met")]
+
+
+def main():
+    parser = argparse.ArgumentParser(description="The picture of a page of `pareto`.")
+    parser.add_argument("page", nargs="?", type=Path, default=PAGE)
+    parser.add_argument("--out", default="pareto.png")
+    options = parser.parse_args()
+    lines = lines_of(options.page.read_text())
+    budgets = SimpleNamespace(budgets=sorted({x.budget for x in lines}))
+    draw(SimpleNamespace(lines=lines, points=[], options=budgets), options.out)
+    print(f"{options.out}: {len(lines)} lines")
+
+
+if __name__ == "__main__":
+    main()
