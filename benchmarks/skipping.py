@@ -39,19 +39,21 @@ NOTHING = {
     "OF_NO_MODES": -1.0,
     "OF_MODES_OF_SLOPES": 1e-12,
     "OF_DOUBLINGS": 1e-6,
+    "OF_DOUBLINGS_WARM": 1e-6,
     "OF_FAINT": -1.0,
     "SINGLE_FROM": np.inf,
 }
 MODES = {"OF_MODES", "OF_NO_MODES", "OF_MODES_OF_SLOPES"}
+DOUBLINGS = {"OF_DOUBLINGS", "OF_DOUBLINGS_WARM"}
 
 # What each row does without.
 ROWS = {
     "nothing left out": None,
-    "layers that are alike": {*MODES, "OF_DOUBLINGS", "OF_FAINT", "SINGLE_FROM"},
-    "azimuth modes": {"OF_MERGING", "OF_DOUBLINGS", "OF_FAINT", "SINGLE_FROM"},
+    "layers that are alike": {*MODES, *DOUBLINGS, "OF_FAINT", "SINGLE_FROM"},
+    "azimuth modes": {"OF_MERGING", *DOUBLINGS, "OF_FAINT", "SINGLE_FROM"},
     "doublings": {"OF_MERGING", *MODES, "OF_FAINT", "SINGLE_FROM"},
-    "faint columns": {"OF_MERGING", *MODES, "OF_DOUBLINGS", "SINGLE_FROM"},
-    "single precision": {"OF_MERGING", *MODES, "OF_DOUBLINGS", "OF_FAINT"},
+    "faint columns": {"OF_MERGING", *MODES, *DOUBLINGS, "SINGLE_FROM"},
+    "single precision": {"OF_MERGING", *MODES, *DOUBLINGS, "OF_FAINT"},
     "all, columns as they come": {"order"},
     "all": set(),
 }

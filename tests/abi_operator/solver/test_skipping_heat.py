@@ -132,6 +132,19 @@ def test_slopes_are_those_of_every_layer_in_the_modes_that_count():
     assert np.median(error) < 1e-6
 
 
+def test_slopes_in_a_sun_that_does_not_shine_are_the_means():
+    """`toa_radiance` says so."""
+
+    def total(irradiance):
+        given = columns() | {"solar_irradiance": irradiance}
+        return jnp.sum(toa_radiance(**given, num_streams=STREAMS, num_modes=1))
+
+    by_night = columns()["solar_irradiance"] == 0
+    of_mean = np.asarray(jax.grad(total)(columns()["solar_irradiance"]))[by_night]
+    found = slopes(1e-3)[1]["solar_irradiance"][by_night, 0]
+    np.testing.assert_allclose(found, of_mean, rtol=1e-4)  # doublings end as the budget allows
+
+
 def test_modes_of_what_hardly_scatters_are_not_solved_for_slopes():
     """The mean depends on no azimuth."""
     found, whole = (slopes(x)[1]["relative_azimuth"][:, 0] for x in (1e-3, None))
