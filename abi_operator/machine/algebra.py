@@ -21,9 +21,13 @@ from .backend import on_cpu
 from .plain import is_plain
 
 _WRITTEN_OUT = 16  # longest sum of a matrix product that is written out
-# Terms of each operation of a sum in float32, none of which has more arithmetic than bytes.
+# Terms of each operation of a sum in float32, none of which has more arithmetic than bytes, and of
+# one in either precision where all columns share a factor, of which hardly any bytes are read.
 _IN_PARTS = {5: (2, 3), 6: (3, 3), 7: (3, 4), 8: (4, 4)}
 _IN_PARTS |= {9: (3, 3, 3), 10: (3, 4, 3), 11: (3, 4, 4), 12: (3, 5, 4)}
+_OF_SHARED = _IN_PARTS | {8: (3, 5), 10: (3, 3, 4), 12: (3, 3, 3, 3)}
+_OF_SHARED_IN_DOUBLE = {9: (4, 5), 10: (5, 5), 11: (5, 6), 12: (6, 6)}
+_ALONE = 11  # terms of a product from which on its last operation has room for nothing else
 
 
 def converted(x: Any, dtype: Any) -> Any:
@@ -127,21 +131,42 @@ def product(
     A short sum over `inner` is written out: a chain of fused multiply-adds on whole batches, five
     to ten times faster than a batched ``dot`` on matrices of 2 to 8 rows. From 16 on the ``dot`` is
     faster, and written-out sums would take minutes to compile. In float32 sums of 5 to 12 terms
-    come in two or three operations, none of which has more arithmetic than bytes: what that is good
-    for stands in `kernels.one_kernel`.
+    come in two or more operations, none of which has more arithmetic than bytes, and in float64
+    those of 9 to 12 where all columns share `b`: what that is good for stands in
+    `kernels.one_kernel`.
     """
     inner = a.shape[1]
     if inner > _WRITTEN_OUT:
         b = b.joined() if isinstance(b, Rows) else b
         return jnp.einsum("ik...,kj...->ij...", a, b, precision=jax.lax.Precision.HIGHEST)
-    terms, before = _terms(a, b), []
-    if inner in _IN_PARTS and a.dtype == jnp.float32:
-        start = 0
-        for count in _IN_PARTS[inner][:-1]:
-            before = [_sum_of_some(before, a, b, slice(start, start + count))]
-            start += count
-        terms = terms[start:]
-    return total([*before, *terms])
+    terms, before, start = _terms(a, b), [], 0
+    for count in _parts(a, b)[:-1]:
+        before = [_sum_of_some(before, a, b, slice(start, start + count))]
+        start += count
+    return total([*before, *terms[start:]])
+
+
+def _parts(a, b):
+    """Numbers of terms of the operations that a product comes in; none where it is one."""
+    shared = a.ndim > 2 and not isinstance(b, Rows) and all(n == 1 for n in b.shape[2:])
+    if a.dtype == jnp.float64:
+        table = _OF_SHARED_IN_DOUBLE if shared else {}
+    else:
+        table = _OF_SHARED if shared else _IN_PARTS
+    return table.get(a.shape[1], ())
+
+
+def comes_in_parts(a: Float[Array, "inner *_"]) -> bool:
+    """Whether a sum over that axis does, or what has as much arithmetic as one over it."""
+    return a.dtype == jnp.float32 and a.shape[0] in _IN_PARTS
+
+
+def product_alone(
+    a: Float[Array, "row inner *#batch"], b: Float[Array, "inner col *#batch"]
+) -> Array:
+    """`product` for use beside other terms inside a kernel: a long one is an operation by itself,
+    so that none has more arithmetic than bytes."""
+    return fenced(product)(a, b) if a.shape[1] >= _ALONE else product(a, b)
 
 
 def _terms(a, b):

@@ -45,13 +45,14 @@ def one_kernel(
     than bytes on 20 kilobytes. With the tiles of `batching` there is none of the second kind up to
     8 rows in float64, nor up to 4 in float32, whose bytes are half as many (12 of both where sums
     come `in_parts`: with 10, the rows of 20 streams, a value then takes 0.65 of the time, and half
-    as long again to compile). A matrix with a column for each of many views is shared, too, from
-    65 of them at 4 rows, 24 at 8 and 16 at 12, and the largest of 39 is a ``dot``: with more than
-    about half as many nothing is marked. A function of larger ones is not marked, but one call all
-    the same: taken apart, in a loop over layers, its parts that need the layer alone would be
-    computed for all layers ahead and read one by one, by a hundred kernels. A function with an
-    operation of the first kind (of very many layers) is left as it is, and so are derivatives of
-    `function` and what `jax.vmap` makes of it, in which nobody has counted.
+    as long again to compile; with 5 to 12 slopes in float32 take 0.6 to 0.8 of it). A matrix with a
+    column for each of many views is shared, too, from 65 of them at 4 rows, 24 at 8 and 16 at 12,
+    and the largest of 39 is a ``dot``: with more than about half as many nothing is marked. A
+    function of larger ones is not marked, but one call all the same: taken apart, in a loop over
+    layers, its parts that need the layer alone would be computed for all layers ahead and read one
+    by one, by a hundred kernels. A function with an operation of the first kind (of very many
+    layers) is left as it is, and so are derivatives of `function` and what `jax.vmap` makes of it,
+    in which nobody has counted.
 
     Nor does XLA compile a kernel with an argument that is of no use in it (the process ends with
     "All or none of the slices should have an explicit index"). Arguments that `function` does not

@@ -42,10 +42,8 @@ def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
     if not on_cpu():
         fitting = [tile for most, tile in _SOLVER_ELSEWHERE.items() if num_streams <= most]
         return fitting[0] if fitting else _ELSEWHERE
-    single = jnp.dtype(dtype) == jnp.float32
-    if num_streams > 16:
-        return 64 if single or rounds else 32
-    return 128 if single and num_streams > 8 else 64
+    single = rounds or jnp.dtype(dtype) == jnp.float32
+    return 64 if single or num_streams <= 16 else 32
 
 
 def tile_of_states(columns: int, num_streams: int, dtype: Any) -> int:

@@ -130,7 +130,7 @@ def slopes_of_mode(
     (stack, (column, _), room), _ = jax.lax.scan(up, at_ground, numbers, reverse=True)
     answers, fields = at_the_top(stack, column)
 
-    @compiled
+    @partial(compiled, in_parts=True)
     def undo_one(above, air, jumps, doublings, room, number, order, kernels):
         fields, totals, slopes, of_jumps = above
         layer, view_secant, own = _read(air, doublings, number, order)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced, product, total, transpose
+from ...machine.algebra import comes_in_parts, fenced, product, product_alone, total, transpose
 from ..method.bordered import Bordered, combined
 
 
@@ -141,9 +141,18 @@ def pair(
 
 @fenced
 def _pairs_of_nodes(factor, nodes, weight, more):
-    terms = [_outer(x[:, 1], x[:, 0]) + _outer(x[:, 0], x[:, 1]) for x in nodes]
-    half = 0.5 * total(terms)
+    *others, last = nodes
+    plus = fenced(_plus_twice_pair) if comes_in_parts(last) else _plus_twice_pair
+    twice = None
+    for x in others:
+        twice = plus(twice, x)
+    half = 0.5 * _plus_twice_pair(twice, last)
     return factor * (half if more is None else half + weight * more)
+
+
+def _plus_twice_pair(before, x):
+    terms = _outer(x[:, 1], x[:, 0]), _outer(x[:, 0], x[:, 1])
+    return total(terms if before is None else [before, *terms])
 
 
 def _outer(x, y):
@@ -246,7 +255,7 @@ def side(quotient: Action, x: Bordered) -> Side:
 @fenced
 def side_of_nodes(left, sent, core, border, corner):
     """Core and border of a cotangent with a matrix on one side."""
-    one_side = product(left, core) + 0.5 * product(sent, transpose(border))
+    one_side = product_alone(left, core) + 0.5 * product(sent, transpose(border))
     return one_side, product(left, border) + swapped(sent) * corner
 
 
@@ -260,7 +269,7 @@ def side_of_beams(ratio, over, right, middle, x, driven):
 
 def both_sides(core, border, sent, left):
     """Core with a quotient on the other side, too, inside a kernel."""
-    return product(core, transpose(left)) + 0.5 * product(border, transpose(sent))
+    return product_alone(core, transpose(left)) + 0.5 * product(border, transpose(sent))
 
 
 def symmetric(x):

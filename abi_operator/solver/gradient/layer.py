@@ -162,7 +162,7 @@ def descend_warm(
     start = tau * step
     square = start * start
     of_start, of_doubling = own_beams, next_step
-    if not small_enough(fields.nodes.shape[0], tau.dtype):
+    if not small_enough(fields.nodes.shape[0], tau.dtype, in_parts=True):
         of_start, of_doubling = (one_kernel(f, 1) for f in (own_beams, next_step))
     own = of_start(secants, kept.b_inverse.diagonal, start, jnp.asarray(d, tau.dtype))
     p = feed(kept.b_inverse)

@@ -199,13 +199,13 @@ def _down(carry: Any, room: Room, given: _Given, keeper: Keeper, single_scatteri
         totals, new = _collected(step, layer.tau, totals, a, b, coalbedo)
         return fields, totals, slopes.plus(number, order.odd, new), faces
 
-    undo_one = given.compiled(undo)
+    undo_one = given.compiled(undo, in_parts=True)
 
     def all_layers(carry, room, given):
         step = lambda carry, number: undo_one(carry, room, given, given.place(number))  # noqa: E731
         return over_layers(step, carry, given.plan)
 
-    return given.compiled(all_layers)(carry, room, given)
+    return given.compiled(all_layers, in_parts=True)(carry, room, given)
 
 
 def _fields_at_the_top(stack: Bordered, weight, above: Above | None = None):

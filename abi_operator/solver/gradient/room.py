@@ -111,7 +111,7 @@ class Keeper:
         def arrays(rows, number):
             return jax.tree.map(as_array, entries(rows, number), is_leaf=is_entry)
 
-        small = small_enough(self.num_nodes, self.dtype)
+        small = small_enough(self.num_nodes, self.dtype, in_parts=True)
         return entries(rows, number) if small else self._moved_at_once(arrays)(rows, number)
 
     def _moved_at_once(self, function: Callable[..., Any], **how: bool) -> Callable[..., Any]:

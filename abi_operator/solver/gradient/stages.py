@@ -7,7 +7,7 @@ is thermal light (`thermal`); of A and B^-1 they are `mode`'s over h. Nothing is
 
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced, product, transpose
+from ...machine.algebra import fenced, product, product_alone, transpose
 from ..method.bordered import Bordered
 from .fields import (
     Action,
@@ -133,7 +133,7 @@ def _chained(ninth, v, sent_v, ratio_u, with_u, x_border, corner):
     """Core and border with W on one side from those with U."""
     core, border = with_u
     sent = sent_v * ratio_u
-    both = product(v, core) + 0.5 * product(sent, transpose(x_border))
+    both = product_alone(v, core) + 0.5 * product(sent, transpose(x_border))
     driven = product(v, border) + swapped(sent) * corner
     return core / 3 - ninth * both, border / 3 - ninth * driven
 

@@ -37,15 +37,22 @@ for dtype in (np.float64, np.float32):
         "surface_emission": np.ones(count, dtype),
     }
     assert np.isfinite(toa_radiance(*arguments, **sources, **options)).all()
+    cases = [(toa_radiance, sources, None)]
+    if dtype == np.float64:
+        cases += [(toa_brf, {}, 1e-3), (toa_radiance, sources, 1e-3)]
+    for door, more, error_budget in cases:
+        how = {"num_streams": num_streams, "num_doublings": 4, "error_budget": error_budget}
+        total = lambda x: door(*x, **more, **how).sum()
+        assert all(np.isfinite(x).all() for x in jax.grad(total)(arguments))
 """
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "num_streams, num_layers", [(4, 1), (4, 3), (8, 3), (12, 3), (16, 3), (24, 3)]
+    "num_streams, num_layers", [(4, 1), (4, 3), (8, 3), (10, 3), (16, 3), (20, 3), (24, 3)]
 )
 def test_value_and_gradient_compile_with_every_thread(num_streams, num_layers):
-    """In both precisions, more columns than a tile has; also several views, and heat."""
+    """In both precisions, more columns than a tile has; also several views, heat, and budgets."""
     environment = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAX_ENABLE_X64")}
     sizes = map(str, (num_streams, num_layers, 260))
     subprocess.run([sys.executable, "-c", PROGRAM, *sizes], env=environment, check=True)
