@@ -49,7 +49,7 @@ for dtype in (np.float64, np.float32):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "num_streams, num_layers", [(4, 1), (4, 3), (8, 3), (10, 3), (16, 3), (20, 3), (24, 3)]
+    "num_streams, num_layers", [(4, 1), *((n, 3) for n in (4, 8, 10, 12, 16, 20, 24))]
 )
 def test_value_and_gradient_compile_with_every_thread(num_streams, num_layers):
     """In both precisions, more columns than a tile has; also several views, heat, and budgets."""
