@@ -30,7 +30,7 @@ _CACHE, _SHORTEST_COMPILATION = "JAX_COMPILATION_CACHE_DIR", 0.0
 # imported before pytest is ready is not checked for shapes). All of XLA's flags must begin with two
 # dashes: those behind one that does not are passed over.
 _EXTRA = "--xla_backend_extra_options"
-_LEAN = f"{_EXTRA}=xla_cpu_disable_new_fusion_emitters=true,xla_cpu_disable_loop_unrolling=true"
+_LEAN = f"--xla_backend_optimization_level=1 {_EXTRA}=xla_cpu_disable_new_fusion_emitters=true"
 
 _OPTIMISED = "JAX_DISABLE_MOST_OPTIMIZATIONS"
 

@@ -1,5 +1,6 @@
 """How columns in memory are cut into chunks of a few widths."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -19,10 +20,13 @@ def cut(size: int, widths: Sequence[int], num_cores: int) -> list[Chunk]:
     """Start and width of each chunk.
 
     Large chunks, as many on every core; smaller ones for what is left, so that cores end together.
+    These are as wide as lets them end soonest, if a chunk takes as long to begin and to end as half
+    as many columns take to be solved as are worth a program: the second width.
     """
     *smaller, largest = widths
     if not smaller:
         return _evenly(0, size, largest)
+    to_begin = smaller[-1 if len(smaller) == 1 else 1] // 2
     share = size // (largest * num_cores) * num_cores * largest
     if size - share > largest * num_cores - smaller[-1]:
         share = size  # no more columns twice than a small chunk has
@@ -30,10 +34,11 @@ def cut(size: int, widths: Sequence[int], num_cores: int) -> list[Chunk]:
     rest = size - share
     if rest == 0:
         return chunks
-    fitting = [w for w in smaller if w >= rest]
-    if fitting:
-        return [*chunks, (max(0, size - fitting[0]), fitting[0])]
-    return chunks + _evenly(share, rest, smaller[-1])
+    rounds = {w: math.ceil(math.ceil(rest / w) / num_cores) for w in smaller}
+    width = min(smaller, key=lambda w: rounds[w] * (w + to_begin))
+    if width >= rest:
+        return [*chunks, (max(0, size - width), width)]
+    return chunks + _evenly(share, rest, width)
 
 
 def _evenly(start: int, count: int, width: int) -> list[Chunk]:

@@ -296,4 +296,9 @@ def _alone() -> Kept:
 
     JAX does not take these inside another `jax.jit`.
     """
-    return Kept(_wanted, compiler.options())
+    return Kept(_wanted_alone, compiler.options())
+
+
+def _wanted_alone(of: tuple[Program, Any], leaves: Leaves) -> Any:
+    with compiler.traced_for(compiler.options()):
+        return _wanted(of, leaves)

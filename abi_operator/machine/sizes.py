@@ -16,17 +16,22 @@ from typing import Any
 import jax.numpy as jnp
 
 from .backend import on_cpu
+from .compiler import SHORTEST, shortest_loop
 
 VECTOR = 8
 """Numbers in double precision that a vector unit holds at most; tiles narrower than a few of these
 leave it idle."""
+
+# Of few rows, or in single precision, a layer of so many columns is in the cache; of more streams
+# one of as few as there are vectors of, or of half as many.
+_TILE, _FEW_STREAMS, _MORE_STREAMS = 64, 6, 16
 
 # What another device than a CPU takes, of whatever is taken together, and of the solver's columns
 # up to 8 and up to 16 streams. A GPU needs half the time a column for 16,384 that it needs for
 # 4,096, and 0.75 to 0.95 of that for 32,768; where columns are sorted, 0.7 in chunks of two tiles.
 _ELSEWHERE, _SOLVER_ELSEWHERE = 4096, {8: 32768, 16: 16384}
 _SORTED_TILES_ELSEWHERE = 2
-# Tiles of a chunk of columns that are sorted.
+# Of a chunk of columns that are sorted, in tiles of 64, or of 32.
 _SORTED_TILES = 32
 # Columns of the solver in a tile of states, in tiles of the solver: its own loop is inside.
 _SOLVER_TILES, _SOLVER_TILES_ELSEWHERE = 8, 2
@@ -35,22 +40,35 @@ _SOLVER_TILES, _SOLVER_TILES_ELSEWHERE = 8, 2
 def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
     """Columns that the solver takes at once, at most; `rounds` tells whether most is in float32.
 
-    Below 64 LLVM unrolls short loops over them number by number, without vectors
-    (`algebra.weighted_rows` has what was done about it). Where a layer is one kernel (`kernels`) a
-    tile is also small enough for that.
+    The fewer, the more of a layer is in the cache next to the processor, but of too few LLVM makes
+    no vectors (`compiler.shortest_loop`; `algebra.weighted_rows` has what was done about it). Where
+    a layer is one kernel (`kernels`) a tile is also small enough for that.
     """
     if not on_cpu():
         fitting = [tile for most, tile in _SOLVER_ELSEWHERE.items() if num_streams <= most]
         return fitting[0] if fitting else _ELSEWHERE
-    single = rounds or jnp.dtype(dtype) == jnp.float32
-    return 64 if single or num_streams <= 16 else 32
+    return _tile(num_streams, dtype, rounds, shortest_loop())
+
+
+def _tile(num_streams: int, dtype: Any, rounds: bool, shortest: int) -> int:
+    if rounds or jnp.dtype(dtype) == jnp.float32 or num_streams <= _FEW_STREAMS:
+        return _TILE
+    return shortest if num_streams <= _MORE_STREAMS else shortest // 2
 
 
 def tile_of_states(columns: int, num_streams: int, dtype: Any) -> int:
     """States of which each is so many columns of the solver that are solved at once, at most."""
-    tile = tile_size(num_streams, dtype)
-    tiles = _SOLVER_TILES if on_cpu() else _SOLVER_TILES_ELSEWHERE
-    return VECTOR * max(1, tiles * tile // columns // VECTOR)
+    if on_cpu():
+        together = _SOLVER_TILES * _whole(num_streams, dtype)
+    else:
+        together = _SOLVER_TILES_ELSEWHERE * tile_size(num_streams, dtype)
+    return VECTOR * max(1, together // columns // VECTOR)
+
+
+def _whole(num_streams: int, dtype: Any, rounds: bool = False) -> int:
+    """Columns of which those that are taken together are a multiple, on a CPU."""
+    single = rounds or jnp.dtype(dtype) == jnp.float32
+    return _TILE if single or num_streams <= _MORE_STREAMS else _TILE // 2
 
 
 def tile_of_grounds() -> int:
@@ -66,14 +84,18 @@ def chunks_of_columns(
     Those that are put `in_order` before they are cut into tiles are the more alike in a tile the
     more there are of them.
     """
-    tile = tile_size(num_streams, dtype, rounds)
     if not on_cpu():
+        tile = tile_size(num_streams, dtype, rounds)
         widths = _few_elsewhere(tile)
         return (*widths, _SORTED_TILES_ELSEWHERE * tile) if in_order else widths
+    tile, whole = _tile(num_streams, dtype, rounds, SHORTEST), _whole(num_streams, dtype, rounds)
     if in_order:
-        return 8, tile, 8 * tile, _SORTED_TILES * tile
-    # At few streams a chunk is solved in few times what it needs to begin and to end.
-    return (8, tile, 8 * tile, 16 * tile) if num_streams <= 8 else (8, tile, 8 * tile)
+        return VECTOR, tile, 8 * whole, _SORTED_TILES * whole
+    if num_streams > 8:
+        return VECTOR, tile, 8 * whole
+    # A chunk is solved in few times what it needs to begin and to end.
+    between = (2 * whole,) if tile < whole else ()
+    return VECTOR, tile, *between, 8 * whole, 16 * whole
 
 
 def chunks_of_states(tile: int) -> tuple[int, ...]:

@@ -3,8 +3,8 @@
 Whatever is called with values (``reflectance_factor(state)``, ``toa_brf(tau, ...)``, `jax.jacrev`
 of either) is cut among all cores and compiled for the widest vectors by itself. A `jax.jit` of
 one's own is one program, which XLA runs on one core for each CPU device that JAX has, with vectors
-as wide as LLVM likes them, and is compiled for half as long again: `use_full_speed` settles all
-three before JAX starts.
+as wide as LLVM likes them, in tiles that leave the cache (`compiler`), and is compiled for half as
+long again: `use_full_speed` settles all of that before JAX starts.
 
 `use_compilation_cache` keeps what is compiled, for the next process; the command line does so by
 itself, and keeps what a `Kept` has compiled such that it need not be traced either (`kept`).
@@ -62,7 +62,8 @@ def use_full_speed() -> Speed:
     To be called before JAX is first used: right after the imports. It gives JAX one CPU device for
     each usable core (``jax_num_cpu_devices``), among which columns are shared under any `jax.jit`,
     and adds to ``XLA_FLAGS``, which child processes inherit, how to compile: for the processor's
-    widest vectors where LLVM would not use them (``--xla_cpu_prefer_vector_width``), and sooner
+    widest vectors where LLVM would not use them (``--xla_cpu_prefer_vector_width``), for tiles that
+    stay in the cache and sooner (``--xla_backend_optimization_level``), and sooner again
     (``--xla_backend_extra_options``). What the user has set, in the environment or in `jax.config`,
     stays.
 

@@ -55,7 +55,7 @@ def test_tiles_do_not_show(monkeypatch):
         return map_tiles(function, leaves, width, *others)
 
     monkeypatch.setattr(batching, "map_tiles", watched)
-    monkeypatch.setattr(sizes, "tile_size", lambda *_: 1)
+    monkeypatch.setattr(sizes, "_whole", lambda *_: 1)
     for solve, expected in ((jax.jit(lambda s: solved(s)), (20, 8)), (solved, (8, 8))):
         programs_anew(monkeypatch)
         tiles.clear()

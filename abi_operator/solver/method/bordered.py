@@ -25,9 +25,8 @@ import jax
 from jaxtyping import Array, Float
 
 from ...machine.algebra import as_array, fenced, is_entry, matmul, total, weighted, weighted_rows
+from ...machine.compiler import shortest_loop
 from ...machine.elimination import inverse
-
-_ENOUGH_COLUMNS = 64  # for which LLVM makes vectors of any loop, see `weighted_rows`
 
 
 class Vector(eqx.Module):
@@ -125,7 +124,7 @@ def combined(weights: Sequence[float | Float[Array, "..."]], matrices: Sequence[
     One kernel, or where there are few columns one in long rows for each array.
     """
     leaves = list(zip(*map(_leaves, matrices), strict=True))
-    if leaves[0][0].shape[-1] >= _ENOUGH_COLUMNS:
+    if leaves[0][0].shape[-1] >= shortest_loop():
         return _combined(weights, matrices)
     sums = [weighted_rows(weights, [as_array(x) for x in arrays]) for arrays in leaves]
     return jax.tree.unflatten(jax.tree.structure(matrices[0], is_leaf=is_entry), sums)

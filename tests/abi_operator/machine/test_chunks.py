@@ -39,6 +39,14 @@ def test_cores_share_the_columns_evenly():
         assert busy.max() < 1.1 * size / 2
 
 
+def test_few_columns_are_shared_and_not_filled_up():
+    """A chunk begins and ends in the time of half of 64 columns: rounds of two are counted so."""
+    for size, width in ((5, 8), (20, 8), (40, 64), (100, 64), (300, 64), (600, 64), (1000, 512)):
+        assert cut(size, WIDTHS, 2) == [
+            (max(0, min(k, size - width)), width) for k in range(0, size, width)
+        ]
+
+
 @pytest.mark.parametrize("size", [1, 3, 8, 11, 64, 65, 130, 700])
 def test_results_are_those_of_all_columns_at_once(size):
     x = np.arange(2.0 * size).reshape(size, 2)
@@ -128,7 +136,7 @@ def test_another_number_of_columns_is_no_other_program():
 
     # It stays: older JAX has no function to take one away.
     jax.monitoring.register_event_duration_secs_listener(listen)
-    for size in (5, 64, 512, 1024 * usable_cores()):
+    for size in (5, 64, 512 * usable_cores(), 1024 * usable_cores()):
         toa_brf(*arguments(size), **OPTIONS)
     before = len(compiled)
     for size in (1, 2, 7, 9, 100, 511, 512, 513, 700, 1030, 2000):

@@ -31,3 +31,19 @@ def test_a_gpu_follows_loops_by_itself(monkeypatch):
     assert list(compiler.options()) == ["xla_gpu_enable_command_buffer"]
     monkeypatch.setenv("XLA_FLAGS", "--xla_gpu_enable_command_buffer=")
     assert compiler.options() == {}
+
+
+def test_columns_of_the_shortest_loop_are_those_of_the_level_of_optimisation(
+    monkeypatch, without_flags
+):
+    """What is called with values is compiled at a level of ours, a `jax.jit` at the user's."""
+    monkeypatch.setattr(compiler, "_chosen_level", lambda: compiler.number_of(compiler._LEVEL))
+    own = compiler.options()
+    assert compiler.shortest_loop() == 64
+    with compiler.traced_for(own):
+        assert compiler.shortest_loop() == 32
+    for level, columns in ((3, 64), (1, 32)):
+        monkeypatch.setenv("XLA_FLAGS", f"--{compiler._LEVEL}={level}")
+        assert compiler._LEVEL in own and compiler._LEVEL not in compiler.options()
+        with compiler.traced_for(compiler.options()):
+            assert compiler.shortest_loop() == columns

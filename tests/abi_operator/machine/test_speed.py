@@ -27,7 +27,9 @@ assert jax.local_device_count() == usable_cores()
 flags = os.environ["XLA_FLAGS"].split()
 if vector_bits() is not None:
     assert flags.pop(0) == f"--xla_cpu_prefer_vector_width={vector_bits()}"
-assert [flag.partition("=")[0] for flag in flags] == ["--xla_backend_extra_options"]
+assert [flag.partition("=")[0] for flag in flags] == [
+    "--xla_backend_optimization_level", "--xla_backend_extra_options"
+]
 warnings.simplefilter("error")
 assert abi_operator.use_full_speed() == found
 print(found)
@@ -100,7 +102,10 @@ def finish(*children):
 
 
 def test_full_speed_is_what_nobody_has_chosen_otherwise():
-    flags = "--xla_cpu_prefer_vector_width=256 --xla_backend_extra_options=xla_one=two"
+    flags = (
+        "--xla_cpu_prefer_vector_width=256 --xla_backend_extra_options=xla_one=two "
+        "--xla_backend_optimization_level=2"
+    )
     with_devices = f"{flags} --xla_force_host_platform_device_count=3"
     by_flags = start(USERS_CHOICE, XLA_FLAGS=with_devices)
     (sentence,) = finish(start(FULL_SPEED))
