@@ -26,8 +26,10 @@ from rounds import AGREE, digits, table
 from abi_operator.solver import on_double_gauss, toa_brf
 
 STREAMS, COLUMNS = (4, 8, 16), 2048
+ROUNDS_OF_BATCHES = 5
 ROUNDS = 15  # after a pause a call of milliseconds takes half as long again every now and then
 SHARE = 0.9  # of the tuned rate
+LARGE_BATCH, GROWTH = 1000, 1.15  # flat in batch from
 JUDGED = {  # what the script calls: what it is beside
     "value": "value",
     "value and `jax.vjp`": "value + gradient",
@@ -164,6 +166,49 @@ def rows_of(num_streams, script, tuned, peers, options, bars):
             wanted = expected if found.ndim else expected.sum()
             error[program] = np.maximum(error[program], np.max(np.abs(found / wanted - 1)))
     return judged(num_streams, programs, first, seconds, error, (script, tuned), options, bars)
+
+
+def batches(peers, options, sizes, bars):
+    """Cost a column from batch to batch, of a value and of a value with all slopes (`--sweep`)."""
+    names = list(JUDGED)[:2]
+    with Process("script") as script:
+        for n in options.sweep_streams:
+            print(f"Batches in plain calls, {n} streams, {options.layers} layers:\n")
+            rows, found = [], {}
+            for count in sizes:
+                seconds, error = of_batch(script, peers, n, count, names, options.layers)
+                row = [count]
+                for name in names:
+                    micro = sorted(1e6 * x / count for x in seconds[name])
+                    found[count, name] = statistics.median(micro)
+                    row += [digits(found[count, name])]
+                    row += [f"{digits(micro[0])}-{digits(micro[-1])}"]
+                row.append(f"{found[count, names[1]] / found[count, names[0]]:.2f}")
+                rows.append([*row, *(f"{error[name]:.0e}" for name in names)])
+                worst = max(error.values())
+                bars.judge(worst <= AGREE, f"{count} columns at {n}: {worst:.0e} apart")
+            head = ["columns", "value [us a column]", "range", "+ `jax.vjp`", "range", "ratio"]
+            table([*head, "value from nanodisort's", "gradient program's"], rows)
+            for name in names:
+                large = [found[k, name] for k in sizes if k >= LARGE_BATCH]
+                growth = max(large, default=1) / min(large, default=1)
+                text = f"plain {name} at {n}: {growth:.2f} from batch to batch"
+                bars.judge(growth <= GROWTH, text)
+
+
+def of_batch(script, peers, num_streams, count, names, layers):
+    """Seconds of each call but the first, and the largest error of what nanodisort solves."""
+    seconds, error = {name: [] for name in names}, dict.fromkeys(names, 0.0)
+    for turn in range(ROUNDS_OF_BATCHES + 1):
+        judged = min(count, peers.capacity)
+        peers.put(workload.columns(count, layers, turn).first(judged))
+        expected = peers.solve("nanodisort", num_streams, judged)[0]
+        for name in names[turn % 2 :] + names[: turn % 2]:
+            spent, brf = script.solve(name, num_streams, count, layers, turn)
+            error[name] = np.maximum(error[name], np.max(np.abs(brf[:judged] / expected - 1)))
+            if turn:
+                seconds[name].append(spent)
+    return seconds, error
 
 
 def judged(num_streams, programs, first, seconds, error, processes, options, bars):

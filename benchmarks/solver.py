@@ -8,7 +8,8 @@ before had. Beside the time stands the error of those very calls. All solve on t
 Gauss, which others have, so that they agree to rounding; times are the same on our own. `--sweep`
 (see --help) measures against batch, layers, streams or precision, memory and compiling, Jacobians
 and `jax.vmap`.
-`--plain` times a user's script without any setting instead, beside a process tuned by hand.
+`--plain` times a user's script without any setting instead, beside a process tuned by hand, or
+with `--sweep batch` in batches up to `--largest`.
 `--check` judges all that was measured and exits with 1 where a bar is missed.
 """
 
@@ -217,7 +218,11 @@ def main():
         on_double_gauss(),
     ):
         rounds = Rounds(peers, options.repeats, options.seconds)
-        if options.plain:
+        if options.plain and "batch" in options.sweep:
+            options.sweep_streams = options.sweep_streams or solver_sweeps.USUAL_STREAMS
+            sizes = [k for k in solver_sweeps.BATCHES if k <= options.largest]
+            plain.batches(peers, options, sizes, bars)
+        elif options.plain:
             plain.plain(peers, options, bars)
         elif not options.sweep or "main" in options.sweep:
             agreement(peers, options.streams, bars)

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 import workload
 from peers import Peers, peak_memory, usable_peers
+from plain import GROWTH, LARGE_BATCH
 from rounds import AGREE, Program, Rounds, apart, digits, table
 
 BATCHES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000)
@@ -21,7 +22,7 @@ LAYERS = (1, 2, 5, 10, 20, 40, 60)
 STREAMS = (2, 4, 6, 8, 12, 16, 24, 32)
 USUAL_STREAMS = (8, 16)
 BATCHES_OF_MEMORY = (1000, 10_000, 100_000)
-LARGE_BATCH, FEW_LAYERS, GROWTH = 1000, 20, 1.15  # flat in batch from, linear in layers from
+FEW_LAYERS = 20  # linear in layers from
 FLOAT32_STREAMS, FLOAT32_GAIN = (8, 16), 1.6
 MAPPED_SHARE = 0.7  # of the built-in batch's speed
 JACOBIAN_COST = 1.3  # times value + gradient of the same columns
