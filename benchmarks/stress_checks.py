@@ -18,6 +18,7 @@ from abi_operator.solver import toa_albedo, toa_brf, toa_radiance
 
 FLOOR = 1e-3
 AGREE = 0.01  # of N and 2N streams, where signs are judged
+ROUNDED = 1e-6  # more of secant times mu0 than what rounding leaves is a sun through a sphere
 BUDGET = 1e-3
 BUDGET_FLOOR = 0.01  # as `Settings.error_budget` has it
 MOST_STREAMS, DOUBLED_UP_TO = 64, 16
@@ -40,7 +41,7 @@ CHECKS = {
     "energy": "plane albedo less 1 of the column made conservative over white ground; radiance of "
     "the column in an enclosure of one temperature less the black body's",
     "absorption": "plane albedo outside [0, 1]",
-    "reciprocity": "sun and view exchanged",
+    "reciprocity": "sun and view exchanged, both through a plane",
     "jvp and vjp": "forward and reverse mode, which share one gradient, of its terms' sizes",
     "slope": "reverse mode along all arguments at once and a difference quotient, of the same",
     "partial": "slope in one number of one argument, and a quotient of steps inward, of itself "
@@ -211,8 +212,11 @@ class Judged:
 
     def _of_sunlight(self):
         columns, how = self.columns, {"num_streams": self.streams}
-        exchanged = columns | {"mu0": columns["mu"], "mu": columns["mu0"]}
-        self._errors("reciprocity", self._apart(value(exchanged, **how), self.value))
+        exchanged = {"mu0": columns["mu"], "mu": columns["mu0"]}
+        exchanged["secant"] = np.broadcast_to(1 / columns["mu"][:, None], columns["tau"].shape)
+        self._errors("reciprocity", self._apart(value(columns | exchanged, **how), self.value))
+        bent = abs(columns["secant"] * columns["mu0"][:, None] - 1) > ROUNDED
+        self.errors["reciprocity"][bent.any(axis=1)] = np.nan
         ground = columns["albedo"]
         black, white = (value(columns | {"albedo": np.full_like(ground, x)}, **how) for x in (0, 1))
         size = np.maximum(abs(self.value), self.floor)

@@ -2,8 +2,9 @@
 
 Every column is of one stratum, which holds one of its properties at an extreme; each of the others
 is at an extreme of its own in one column of four. In the stratum "everything" all are, and every
-layer draws its own. What an argument may be at all is `abi_operator.ranges.SOLVER`; `out_of_range`
-gives what must be refused.
+layer draws its own. In every stratum the sun of one column in four comes through a sphere
+(`slant_path_secant`). What an argument may be at all is `abi_operator.ranges.SOLVER`;
+`out_of_range` gives what must be refused.
 """
 
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from abi_operator.optics.mie_phase import MiePhase
 from abi_operator.planck import in_band_radiance
 from abi_operator.ranges import SOLVER
 from abi_operator.satellites import solar_irradiance
-from abi_operator.solver import half_range
+from abi_operator.solver import half_range, slant_path_secant
 
 SEED = 20261125
 # Streams, layers at most and at least, whether they emit, columns of a batch, share of all columns.
@@ -65,6 +66,7 @@ EXTREMES = {
 }
 ELSEWHERE = 0.25  # columns of a stratum in which another property is at an extreme, too
 THICKEST, LOWEST = 1e5, 1e-3
+THROUGH_A_SPHERE, HIGHEST = 0.25, 1e5  # columns; level [m]
 # Sizes with rainbow and glory, in a band where both are sharp. [um]
 BAND, RADII_UM = "C02", np.array([2.0, 4.0, 7.0, 12.0, 20.0, 35.0])
 COLDEST, HOTTEST, THERMAL_BAND = 200.0, 1500.0, "C07"
@@ -113,6 +115,7 @@ def draw(key, count, num_streams, num_layers, fewest, emitting):
         "mu": mu,
         "relative_azimuth": azimuth,
         "phase_function": phase,
+        "secant": _secants(np.random.default_rng([SEED, *key, 1]), mu0, num_layers),
     }
     if emitting:
         columns |= _sources(rng, albedo, num_layers)
@@ -245,6 +248,15 @@ def _droplets(num_moments, cosine):
     radii = jnp.asarray(RADII_UM)
     moments = MiePhase(radii, "droplets", BAND).moments(num_moments)
     return np.asarray(moments), np.asarray(_in_table(radii, cosine))
+
+
+def _secants(rng, mu0, num_layers):
+    """1 / mu0, or the path between random levels over a sphere; the first column's is a plane's."""
+    height = -np.sort(-rng.uniform(0, HIGHEST, (mu0.size, num_layers + 1)))
+    sphere = rng.random(mu0.size) < THROUGH_A_SPHERE
+    sphere[0] = False
+    slanting = np.asarray(slant_path_secant(jnp.asarray(height), jnp.asarray(mu0)))
+    return np.where(sphere[:, None], slanting, 1 / mu0[:, None])
 
 
 def black_body(temperature):

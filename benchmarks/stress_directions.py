@@ -8,6 +8,7 @@ LEAST = {
     "moments": 0.01,
     "phase_function": 0.1,
     "relative_azimuth": 1.0,
+    "secant": 1.0,
     "solar_irradiance": 1.0,
     "planck_levels": 0.1,
     "surface_emission": 0.1,

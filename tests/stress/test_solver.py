@@ -67,7 +67,7 @@ LOST = {
 def test_columns_of_which_a_budget_once_lost_much(which, emits, index, row):
     (group,) = (g for g in stress.GROUPS if g[:2] == which and g[3] == emits)
     batch = stress.columns_of(group, index, "float64").columns
-    one = {name: x[row : row + 1] for name, x in batch.items()}
+    one = {name: x[row : row + 1] for name, x in batch.items() if name != "secant"}  # in a plane
     whole, within = (value(one, num_streams=which[0], error_budget=x) for x in (None, BUDGET))
     np.testing.assert_allclose(within, whole, rtol=BUDGET, atol=BUDGET * BUDGET_FLOOR)
 
@@ -118,7 +118,8 @@ def test_a_longer_step_compares_the_same_slope(monkeypatch):
     for name in ("value", "both"):
         monkeypatch.setattr(stress_again, name, of_many(getattr(stress_again, name)))
     found = stress_again.over_a_longer_step(SUNLIT, 0, 0, "float64")
-    assert all(error < 1e-6 for error in found.values()) and found["slope"] > 0
+    # A third derivative times the square of 1e-3.
+    assert all(error < 1e-5 for error in found.values()) and found["slope"] > 0
 
 
 def test_columns_that_absorb_are_not_left_to_energy(monkeypatch):

@@ -185,7 +185,7 @@ def _stacked(
         if light.absorbed is None:
             half = half_layer(a, p, tau, own)
             return add_emitting_layer(stack, light, *half, tau, jump, p @ one, None)
-        ones = of_layer(layer.coalbedo, layer.secants(view_secant[None]), _num_nodes(lit))
+        ones = of_layer(layer.coalbedo, layer.secants(view_secant[None]), kernels[0])
         half = absorbing_half_layer(a, p, tau, own, ones, one)
         return add_emitting_layer(stack, light, *half[:2], tau, jump, p @ one, half[2])
 

@@ -116,7 +116,7 @@ def slopes_of_mode(
         a, p = layer.matrices(order.mean, kernels, view_secant[None], single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
         warmth = None if column is None else Warmth(column, read(jumps, number))
-        kept = absorption(ones, layer, view_secant, order)
+        kept = absorption(ones, layer, view_secant, order, kernels[0])
         stack, light, new, room = climb(stack, warmth, kept, a, p, layer.tau, own, room, keep)
         return stack, light, keeper.with_layer(room, new, number)
 

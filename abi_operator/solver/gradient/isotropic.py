@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from ..method.absorption import absorbing, less, of_layer, of_stack, through
 from ..method.bordered import Bordered, Vector
+from ..method.layer import ModeKernels
 from ..method.mode_layers import Layer, Order
 from ..method.quotient import Quotient
 from ..method.refinement import impeded, refined
@@ -54,12 +55,16 @@ class HalfLayer(NamedTuple):
 
 
 def absorption(
-    stack: Vector | None, layer: Layer, view_secant: Float[Array, "*batch"], order: Order
+    stack: Vector | None,
+    layer: Layer,
+    view_secant: Float[Array, "*batch"],
+    order: Order,
+    kernels: ModeKernels,
 ) -> Absorption | None:
-    """What a layer and the stack below it absorb, where the stack's is kept."""
+    """What a layer with kernels of A absorbs, and the stack below it, where that is kept."""
     if stack is None:
         return None
-    own = of_layer(layer.coalbedo, layer.secants(view_secant[None]), layer.even.shape[0])
+    own = of_layer(layer.coalbedo, layer.secants(view_secant[None]), kernels)
     return Absorption(stack, own, order.mean)
 
 

@@ -159,7 +159,7 @@ def _up(
         secants = given.view_secant[None]
         a, p = layer.matrices(given.order.mean, given.kernels, secants, single_scattering)
         keep = lambda room, new, k: keeper.with_doubling(room, new, number, k)  # noqa: E731
-        kept = absorption(ones, layer, given.view_secant, given.order)
+        kept = absorption(ones, layer, given.view_secant, given.order, given.kernels[0])
         stack, (_, ones), new, room = climb(stack, None, kept, a, p, layer.tau, own, room, keep)
         room = keeper.with_layer(room, new, number)
         return (stack, ones), keeper.with_stack(room, stack, number) if keeper.stacks else room

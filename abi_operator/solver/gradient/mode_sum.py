@@ -150,7 +150,7 @@ def _reflectance(inputs: ModeSum, plan: Plan, how: How) -> Float[Array, "view *b
             tau = as_deep_as_seen(layer.tau) if rounded and not mean else layer.tau
             if ones is None:
                 return add_layer(stack, *half_layer(a, p, tau, own), tau), None
-            new = of_layer(layer.coalbedo, layer.secants(view_secants), num_nodes)
+            new = of_layer(layer.coalbedo, layer.secants(view_secants), kernels[0])
             y, z, new = absorbing_half_layer(a, p, tau, own, new)
             return add_absorbing_layer(stack, ones, y, z, tau, new)
 

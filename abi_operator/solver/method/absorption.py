@@ -12,9 +12,10 @@ much, and its slopes in what little they absorb by a fiftieth. So single precisi
    y \leftarrow y + 2y_e - h(Y + Y_e)S^{-1}(y + y_e)
 
 for the start of half a layer, a doubling, and a layer that is put on a stack (`layer`, `adding`).
-It is the azimuthal mean's alone. All are proportional to the co-albedo, and Y's diagonal and its
-beams' rows are set by y: Y is wrong by what rounding leaves of numbers of order 1, whatever the
-depth. It is made symmetric as well, since what is not would double, too.
+It is the azimuthal mean's alone. All are proportional to the co-albedo, but at a sun through a
+sphere (`of_layer`), and Y's diagonal and its beams' rows are set by y: Y is wrong by what rounding
+leaves of numbers of order 1, whatever the depth. It is made symmetric as well, since what is not
+would double, too.
 
 With y light that is emitted is found from what absorbs it alone. As :math:`Z - B^{-1} = hz` with a
 finite z, a layer across which the Planck function increases by D, J = D 1, changes e of `adding` to
@@ -39,7 +40,7 @@ from ...machine.algebra import Rows, fenced, total, transpose
 from .bordered import Bordered, Vector, combined
 from .doublings import Doublings, repeated
 from .ground import isotropic
-from .layer import rational_start
+from .layer import ModeKernels, rational_start
 from .quadrature import half_range, node_scales
 from .quotient import Quotient, minus_and_quotient
 
@@ -73,12 +74,23 @@ def of_ground(ground: Bordered, absorbed: Float[Array, "*batch"] | None = None) 
 
 
 def of_layer(
-    coalbedo: Float[Array, "*batch"], secants: Float[Array, "beam *batch"], num_nodes: int
+    coalbedo: Float[Array, "*batch"], secants: Float[Array, "beam *batch"], kernels: ModeKernels
 ) -> Vector:
-    """``A 1`` of a layer in the azimuthal mean."""
-    mu, weight = half_range(2 * num_nodes)
+    r"""``A 1`` of a layer in the azimuthal mean, whose kernels of A tell where the beams are.
+
+    :math:`(1-\omega)/\mu` and, of a sun through a sphere, what its secant has over 1 / mu0:
+    light of a beam whose secant is not 1 / mu is lost or won without being absorbed. In a plane
+    that is nothing, and must be nothing to the last digit where layers absorb nothing at depths of
+    1e5, so that what rounding leaves of the difference does not count.
+    """
+    mu, weight = half_range(2 * kernels.nodes.shape[0])
     of_nodes = np.sqrt(weight / mu).reshape(-1, *(1,) * coalbedo.ndim)
-    return Vector(jnp.asarray(of_nodes, coalbedo.dtype) * coalbedo, coalbedo * secants)
+    over_cosines = kernels.beams[:, 0]  # The first Legendre function is 1.
+    more = secants - over_cosines
+    # What is left out has a slope all the same.
+    rounding = jnp.where(jnp.abs(more) <= 4 * jnp.finfo(more.dtype).eps * secants, more, 0)
+    more = more - jax.lax.stop_gradient(rounding)
+    return Vector(jnp.asarray(of_nodes, coalbedo.dtype) * coalbedo, coalbedo * over_cosines + more)
 
 
 def absorbing_half_layer(

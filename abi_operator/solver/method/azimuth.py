@@ -167,7 +167,7 @@ def _mean_of_layer(
     a = layer_matrix(kernels[0], moments_a, secants, single_scattering)
     a = conservative(a, coalbedo)
     b_inverse = layer_matrix(kernels[1], moments_b, secants, single_scattering).inverse()
-    return a, b_inverse, of_layer(coalbedo, secants, len(kernels[0].nodes))
+    return a, b_inverse, of_layer(coalbedo, secants, kernels[0])
 
 
 def higher_modes(
