@@ -18,7 +18,7 @@ from abi_operator.solver import toa_albedo, toa_brf, toa_radiance
 
 FLOOR = 1e-3
 AGREE = 0.01  # of N and 2N streams, where signs are judged
-ROUNDED = 1e-6  # more of secant times mu0 than what rounding leaves is a sun through a sphere
+ROUNDED = 8  # roundings; more between secant times mu0 and 1 is a sun through a sphere
 BUDGET = 1e-3
 BUDGET_FLOOR = 0.01  # as `Settings.error_budget` has it
 MOST_STREAMS, DOUBLED_UP_TO = 64, 16
@@ -215,7 +215,8 @@ class Judged:
         exchanged = {"mu0": columns["mu"], "mu": columns["mu0"]}
         exchanged["secant"] = np.broadcast_to(1 / columns["mu"][:, None], columns["tau"].shape)
         self._errors("reciprocity", self._apart(value(columns | exchanged, **how), self.value))
-        bent = abs(columns["secant"] * columns["mu0"][:, None] - 1) > ROUNDED
+        rounded = ROUNDED * np.finfo(columns["mu0"].dtype).eps
+        bent = abs(columns["secant"] * columns["mu0"][:, None] - 1) > rounded
         self.errors["reciprocity"][bent.any(axis=1)] = np.nan
         ground = columns["albedo"]
         black, white = (value(columns | {"albedo": np.full_like(ground, x)}, **how) for x in (0, 1))
