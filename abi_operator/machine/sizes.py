@@ -22,9 +22,10 @@ VECTOR = 8
 """Numbers in double precision that a vector unit holds at most; tiles narrower than a few of these
 leave it idle."""
 
-# Of few rows a layer of so many columns is in the cache; of more, of single precision of twice as
-# many, one of as few as there are vectors of; of many in double precision one of half as many.
-_TILE, _FEW_STREAMS, _FEW_STREAMS_IN_SINGLE, _MORE_STREAMS = 64, 6, 12, 16
+# Of few rows, or in single precision, a layer of so many columns is in the cache; of more streams
+# one of as few as there are vectors of, or of half as many. Within an error budget columns are put
+# in order: those of a narrower tile are more alike, which from 14 streams on is worth more.
+_TILE, _FEW_STREAMS, _FEW_STREAMS_IN_ORDER, _MORE_STREAMS = 64, 6, 12, 16
 
 # What another device than a CPU takes, of whatever is taken together, and of the solver's columns
 # up to 8 and up to 16 streams. A GPU needs half the time a column for 16,384 that it needs for
@@ -38,7 +39,9 @@ _SOLVER_TILES, _SOLVER_TILES_ELSEWHERE = 8, 2
 
 
 def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
-    """Columns that the solver takes at once, at most; `rounds` tells whether most is in float32.
+    """Columns that the solver takes at once, at most.
+
+    `rounds` tells whether they are solved within a budget, most of it in float32.
 
     The fewer, the more of a layer is in the cache next to the processor, but of too few LLVM makes
     no vectors (`compiler.shortest_loop`; `algebra.weighted_rows` has what was done about it). Where
@@ -51,10 +54,11 @@ def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
 
 
 def _tile(num_streams: int, dtype: Any, rounds: bool, shortest: int) -> int:
-    single = rounds or jnp.dtype(dtype) == jnp.float32
-    if num_streams <= (_FEW_STREAMS_IN_SINGLE if single else _FEW_STREAMS):
+    if rounds and num_streams > _FEW_STREAMS_IN_ORDER:
+        return shortest
+    if rounds or jnp.dtype(dtype) == jnp.float32 or num_streams <= _FEW_STREAMS:
         return _TILE
-    return shortest if single or num_streams <= _MORE_STREAMS else shortest // 2
+    return shortest if num_streams <= _MORE_STREAMS else shortest // 2
 
 
 def tile_of_states(columns: int, num_streams: int, dtype: Any) -> int:
