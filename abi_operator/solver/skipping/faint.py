@@ -18,9 +18,11 @@ b is that of isotropic light:
    F(\mu) = \tfrac12\sum_l (2l+1)\,h_l\,P_l(\mu)\sum\omega\tau\chi_l, \qquad
    b = 2S - \sum_l (2l+1)\,h_l^2\sum\omega\tau\chi_l, \qquad h_l = \int_0^1 P_l\,d\mu.
 
-It goes on along a mean secant D, to and from the ground. No layer is doubled or added. How much
-this may miss is known beforehand: of the ground's light the square of what is sent back, and a
-share of what is scattered where light absorbs; and of the air's what is scattered twice,
+It goes on along a mean secant D, to and from the ground. A sun through a sphere is attenuated by
+its secants and scattered by 1 / mu0, so that more of its light reaches the ground than that, by
+:math:`F(\mu_0)(1/\mu_0 - s_0)`, to first order. No layer is doubled or added. How much this may
+miss is known beforehand: of the ground's light the square of what is sent back, and a share of what
+is scattered where light absorbs; and of the air's what is scattered twice,
 
 .. math:: \frac{1}{4\mu_0\mu}\sum_l(2l+1)\left(\sum\omega\tau\chi_l\right)^2,
 
@@ -78,14 +80,18 @@ def of_sunlight(
     # A bound, of which the square is finite: through as much as that no light is seen.
     once, squared = (jnp.minimum(x / some, _OPAQUE) for x in scattered.over_absorbers)
     more = total([x * y * (once + y * squared) for x, y in zip(on, longer, strict=True)])
+    bent = 1 / mu0 - sun_secant
+    more = more + forward[0][0] * bent
     light = seen * (1 + more + again * jnp.exp(-_SCATTERED * absorbed))
     # Light that is scattered out of a beam may meet next to nothing where that is absorbed.
     cubes = [jnp.abs(absorbed * x) ** 3 / 6 for x in longer]
     diffuse = jnp.exp(-DIFFUSE * absorbed)
     unsure = [diffuse * jnp.minimum(_UNSURE * absorbed + x, 1) for x in cubes]
     paths = albedo * (to_view * on[0] * unsure[0] + to_ground * on[1] * unsure[1])
-    turned = back[0] + back[1] + again
-    missing = paths + seen * (turned**2 + _UNSURE * absorbed * again)
+    turned = back[0] + back[1] + again + depth * jnp.abs(bent)
+    # Nor does it take the sun's way through what absorbs.
+    astray = depth * jnp.abs(bent * longer[0]) * absorbed
+    missing = paths + seen * (turned**2 + _UNSURE * absorbed * again + astray)
     missing = jnp.max(missing + _TWICE * _twice(scattered.moments) / (mu0 * mu), axis=0)
     return Faint(2 * light, missing)
 

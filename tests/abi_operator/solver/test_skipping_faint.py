@@ -140,6 +140,19 @@ def test_what_a_column_may_be():
     assert np.quantile(wrong, 0.99) < 0.5 * BUDGET
 
 
+def test_a_sun_at_the_horizon_of_a_sphere():
+    """More of it is scattered to the ground than a plane's of as long a path would send there."""
+    rng = np.random.default_rng(8)
+    given = columns(scattered=5e-4)
+    count = given["mu0"].size
+    mu0 = rng.uniform(0.002, 0.05, count)
+    secant = rng.uniform(0.1, 0.6, (count, 1)) / mu0[:, None] * np.ones(LAYERS)
+    given = given | {"mu0": mu0, "secant": secant}
+    whole, found = (brf(given, x) for x in (None, BUDGET))
+    wrong = np.abs(found - whole) / np.maximum(whole, 0.01)
+    assert np.quantile(wrong, 0.99) < BUDGET and wrong.max() < 10 * BUDGET
+
+
 @pytest.mark.slow
 def test_light_is_rounded_where_the_budget_has_room(monkeypatch):
     """Of columns that are not solved it is that of single precision, within its rounding; here
