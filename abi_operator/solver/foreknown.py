@@ -134,12 +134,15 @@ def _warm(
     ground = 0 if column.surface_emission is None else column.surface_emission
     top = 0 if column.isotropic_top is None else column.isotropic_top
     thermal = thermal + seen * ground
-    light = sun + jnp.abs(ground - (1 - albedo) * levels[-1]) + jnp.abs(top - levels[0])
+    # As `planned` has it of reflectances.
+    flat = 1 if column.secant is None else column.mu0 * column.secant[0]
+    light = sun / flat + jnp.abs(ground - (1 - albedo) * levels[-1]) + jnp.abs(top - levels[0])
     of_light = Expected(
         added=sun * known.added + levels[0],
         least=sun * known.least + thermal,
         dark=sun * known.dark,
         aside=sun * known.aside,
         through=sun * known.through,
+        mu0=known.mu0,
     )
     return jax.lax.stop_gradient(Warm(of_light, light, levels, albedo * seen))

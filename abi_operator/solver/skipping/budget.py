@@ -96,6 +96,8 @@ class Expected(NamedTuple):
     through
         Share of the beam that meets nothing on its way to the ground and back: at least the slope
         in the albedo of a Lambertian ground. [-]
+    mu0
+        Cosine of the sun's zenith angle, by which reflectances are divided. [-]
     peaked
         Of layers that are solved already (`plan.Plan`); None where there are none.
     """
@@ -105,6 +107,7 @@ class Expected(NamedTuple):
     dark: Float[Array, "*batch"]
     aside: Float[Array, "*batch"]
     through: Float[Array, "*batch"]
+    mu0: Float[Array, "*batch"]
     peaked: Float[Array, "*batch"] | None = None
 
 
@@ -146,7 +149,7 @@ def expected(
     twice = (scattered / (1 + scattered)) ** 2 / (cosines[0] * jnp.min(cosines[1:], axis=0))
     aside = jnp.full_like(twice, jnp.inf) if ground is None else twice
     through = jnp.exp(-(1 / cosines[0] + 1 / cosines[1]) * layers.tau)
-    known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside, through)
+    known = Expected(added, least, jnp.full_like(least, LEAST_BRF), aside, through, cosines[0])
     return jax.lax.stop_gradient(known)
 
 

@@ -12,7 +12,8 @@ that is
 with rational functions in place of exponentials: the first moments of what differs and one of half
 the streams' degree k, since layers with different phase functions may have one g (delta-M brings
 those of droplets of other sizes together), and the secants of a low sun, which differ over a
-spherical Earth, and by which more or less of its light is left for the layers below. In thick
+spherical Earth, and by which more or less of its light is left for the layers below. (All of it is
+a share of a sun's light that stands where flat layers would have such a secant: `plan.planned`.) In thick
 layers light is scattered many times, and absorbed as often as that: d is the larger (1 - omega g)
 tau of the two, as a thin black layer counts for little under a thick white one, and for much if it
 is spread through it. From the top, each layer joins the group above it while the sum of this over

@@ -165,6 +165,10 @@ def planned(
         # Of reflectances that are large by 1 / (mu0 + mu), where sun and view graze, as a loss is.
         grazing = 1 / layers.sun_secants[0] + 1 / jnp.max(view_secants, axis=0)
         allowed = allowed * jnp.minimum(grazing, 1)
+        if warm is None:
+            # A reflectance is over mu0, a loss over the cosine of which the sun's way is that of
+            # flat layers: through a sphere the sun shines as if it stood higher.
+            allowed = allowed * known.mu0 * layers.sun_secants[0]
         forward = layers.moments[1][:, 0] / 3
         alike = Alike(layers.tau, 1 - layers.coalbedo, forward, _middle(layers))
         alike = alike._replace(second=_second(layers), sun_secants=layers.sun_secants)

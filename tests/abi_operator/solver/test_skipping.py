@@ -304,7 +304,7 @@ def modes_that_count(last_moment, shares):
     moments = tuple(jnp.repeat(x, STREAMS // 2, axis=1) for x in moments)
     moments = moments[0].at[:, 0].set(1), moments[1]  # all is scattered
     layers = LayersOfModes(one, 0 * one, one, moments)
-    known = Expected(one, one[0], one[0], 1e9 * one[0], one[0])
+    known = Expected(one, one[0], one[0], 1e9 * one[0], one[0], one[0])
     plan = planned(layers, one, known, 1e-3, None)
 
     def body(carry, share, counts):

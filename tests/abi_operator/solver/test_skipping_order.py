@@ -19,7 +19,7 @@ def test_groups_of_slopes_put_columns_in_order_of_slopes():
     mean are nothing, so that what is needed are the groups."""
     tau = jnp.stack([jnp.full(LAYERS, 1.0), jnp.full(LAYERS, 1e-3)], axis=1)
     same, one = 0 * tau + 0.9, jnp.ones(2)
-    known = Expected(one[None], one, 0.01 * one, one, one)
+    known = Expected(one[None], one, 0.01 * one, one, one, one)
     of_values, of_slopes = (
         np.asarray(company.need(Alike(tau, same, 0.5 * same), known, one, one, 1e-3, slopes))
         for slopes in (False, True)

@@ -111,3 +111,31 @@ def test_a_budget_is_kept():
     ]
     wrong = np.linalg.norm(of_all[0] - of_all[1], axis=1) / np.linalg.norm(of_all[1], axis=1)
     assert np.max(wrong) < 0.01
+
+
+def cold(given, **how):
+    """Reflectances, by the program of columns that emit."""
+    sun = np.pi / given["mu0"]
+    levels = np.zeros((COLUMNS, LAYERS + 1))
+    how = how | {"num_streams": STREAMS, "planck_levels": levels}
+    return toa_radiance(**given, solar_irradiance=sun, **how)
+
+
+@pytest.mark.parametrize("door", [brf, cold])
+def test_layers_are_merged_as_a_sun_sees_them_that_is_higher(door):
+    """A hundred times as much of its light, over mu0, is scattered as of one that is on the horizon
+    of a plane, and as much of that is lost by as large a mistake."""
+    rng = np.random.default_rng(5)
+    upper = 10 ** rng.uniform(-0.5, 0.5, (COLUMNS, 1))
+    given = doubled(columns()) | {
+        "tau": np.hstack([upper, 10 ** rng.uniform(-2, 0.5, (COLUMNS, LAYERS - 1))]),
+        "ssa": rng.uniform(0.5, 1, (COLUMNS, LAYERS)),
+        "moments": rng.uniform(0, 0.8, (COLUMNS, LAYERS, 1)) ** np.arange(STREAMS + 1),
+        "phase_function": np.full((COLUMNS, LAYERS), 40.0),
+        "mu0": 10 ** rng.uniform(-3, -2, COLUMNS),
+        "mu": rng.uniform(0.02, 0.1, COLUMNS),
+        "secant": rng.uniform(6, 8, (COLUMNS, 1)) * np.linspace(1, 2, LAYERS),
+    }
+    right, within = (np.asarray(door(given, error_budget=x)) for x in (None, 1e-3))
+    wrong = abs(within / right - 1)
+    assert 0 < np.max(wrong) < 1e-3
