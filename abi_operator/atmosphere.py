@@ -8,7 +8,6 @@ ground may stay single numbers. Layers and levels count from the top.
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .geometry import Geometry
@@ -200,7 +199,7 @@ class Atmosphere(eqx.Module):
     pressure, height
         At the levels, top first: pressure, rising; height above sea level, falling. The last level
         is the ground. Above the first one is as much air as its pressure says, which scatters and
-        absorbs with that of the uppermost layer (`counted_pressure`): wherever the levels begin, a
+        absorbs with that of the uppermost layer (`optics.air`): wherever the levels begin, a
         column has all of its air. Nothing else is above it. [Pa], [m]
     liquid
         Cloud droplets in the layers between the levels.
@@ -224,16 +223,6 @@ class Atmosphere(eqx.Module):
     gases: Gases | None = None
     hydrometeors: dict[str, Hydrometeor] = eqx.field(default_factory=dict)
     background: BackgroundAerosol | None = None
-
-    @property
-    def counted_pressure(self) -> Float[Array, "*batch level"]:
-        """Pressure at the levels, 0 at the first: its steps are the air of the layers. [Pa]
-
-        So air above the first level is counted in the uppermost layer, and the pressure of that
-        level itself moves nothing that goes with the mass of air.
-        """
-        below = self.pressure[..., 1:]
-        return jnp.concatenate([jnp.zeros_like(below[..., :1]), below], axis=-1)
 
 
 class Fire(eqx.Module):

@@ -1,6 +1,6 @@
 """From one state to the columns that the solver is given: one for each exponential term of a band.
 
-Functions are written for one state; callers batch them with `jax.vmap`.
+Functions read as of one state; a batch of states has its axes behind those of every array.
 """
 
 import dataclasses
@@ -16,6 +16,7 @@ from .atmosphere import State
 from .bands import AnyName, SomeBand, by_band, entry, several_bands
 from .geometry import is_up
 from .lambertian import Lambertian
+from .optical_properties import trailing
 from .optics import column_optics, num_terms
 from .planck import in_band_radiance
 from .solver import cos_scattering_angle
@@ -37,7 +38,7 @@ class BandColumns(eqx.Module):
     ----------
     arguments
         Those of `solver.toa_brf` or, of bands that emit, of `solver.toa_radiance` by name, with an
-        axis of columns first.
+        axis of columns first and those of the batch last.
     weight
         Weight of each column. [-]
     bands
@@ -49,14 +50,14 @@ class BandColumns(eqx.Module):
     """
 
     arguments: dict[str, Any]
-    weight: Float[Array, "*batch column"]
+    weight: Float[Array, " column"]
     bands: tuple[str, ...] = eqx.field(static=True)
     places: tuple[int, ...] = eqx.field(static=True)
     emit: bool = eqx.field(static=True)
 
-    def summed(self, terms: Float[Array, "*batch column"]) -> dict[str, Float[Array, "*batch"]]:
+    def summed(self, terms: Float[Array, "column *batch"]) -> dict[str, Float[Array, "*batch"]]:
         """What the solver gives of each column, weighted and summed, by band."""
-        weighted = jnp.unstack(self.weight * terms, axis=-1)
+        weighted = jnp.unstack(trailing(self.weight, terms.ndim) * terms)
         found: dict[str, Array] = {}
         for place, x in zip(self.places, weighted, strict=True):
             name = self.bands[place]

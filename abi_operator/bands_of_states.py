@@ -110,27 +110,24 @@ def _num_columns(leaves: Leaves, structure: Any, options: Options) -> int:
 def _columns(
     tile: Leaves, structure: Any, options: Options, copied: Sequence[bool] | None = None
 ) -> tuple[BandColumns, ...]:
-    """Solver's columns of a tile whose batch is last, with the axis of the batch first.
+    """Solver's columns of a tile, whose batch is last here, too.
 
     Of leaves that are `copied` each band has its own, along their first axis.
     """
     settings = options.settings
     flags = [False] * len(tile) if copied is None else copied
 
-    def of_one(leaves: Leaves) -> tuple[BandColumns, ...]:
-        inputs = jax.tree.unflatten(structure, leaves)
-        return columns_of_bands(
-            inputs.state,
-            options.bands,
-            settings.gases,
-            settings.num_streams + 1,
-            per_band=tuple(jax.tree.unflatten(structure, flags)),
-            emitting=options.emitting,
-            solar_irradiance=inputs.solar_irradiance,
-            satellite=settings.satellite,
-        )
-
-    return jax.vmap(of_one, in_axes=-1)(list(tile))
+    inputs = jax.tree.unflatten(structure, tile)
+    return columns_of_bands(
+        inputs.state,
+        options.bands,
+        settings.gases,
+        settings.num_streams + 1,
+        per_band=tuple(jax.tree.unflatten(structure, flags)),
+        emitting=options.emitting,
+        solar_irradiance=inputs.solar_irradiance,
+        satellite=settings.satellite,
+    )
 
 
 def _solved(groups: Sequence[BandColumns], options: Options) -> Float[Array, "band batch"]:
@@ -149,7 +146,7 @@ def _solved_unread(groups: Sequence[BandColumns], options: Options) -> Float[Arr
     for columns in groups:
         arguments = columns.arguments | {"tau": _without_depth_of_opaque(columns)}
         terms = _terms(columns, arguments, settings)
-        thick = jnp.any(arguments["tau"] > TRACED_TAU, axis=-1)
+        thick = jnp.any(arguments["tau"] > TRACED_TAU, axis=1)
         # A factor, so that slopes are NaN as well.
         found |= columns.summed(terms * jnp.where(thick, jnp.nan, 1).astype(terms.dtype))
     return jnp.stack([found[band] for band in options.bands])
@@ -162,6 +159,8 @@ def _terms(columns: BandColumns, arguments: dict[str, Any], settings: Settings) 
         "num_doublings": settings.num_doublings,
         "error_budget": settings.error_budget,
     }
+    # The batch's axes first, as the solver's doors want them; states within a column stay together.
+    arguments = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 1), arguments)
     return toa_radiance(**arguments, **how) if columns.emit else toa_brf(**arguments, **how)
 
 

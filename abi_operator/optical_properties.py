@@ -11,6 +11,7 @@ Extinction has a leading axis ``term``, over which radiances are summed with `we
 exponentials of a band's gas transmission. Grey matter has one term of weight 1.
 """
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -18,28 +19,32 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ._numerics import safe_divide
+from .machine.algebra import total
+from .machine.occupied import Present, if_present, row_by_row
 
 
 class PhaseFunction(eqx.Module):
     """Angular distribution of single scattering, rotationally symmetric."""
 
-    def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
+    def moments(self, num_moments: int) -> Float[Array, "#layer moment *#batch"]:
         r"""Legendre moments :math:`\chi_l`, :math:`\chi_0 = 1`, without the factor 2l + 1. [-]"""
         raise NotImplementedError
 
-    def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
+    def __call__(self, cos_scattering: Float[Array, "*batch"]) -> Float[Array, "#layer *batch"]:
         """Phase function at a scattering angle, mean 1 over the sphere. [-]"""
         raise NotImplementedError
 
 
 class Scatterer(eqx.Module):
-    """Scattering optical depth of each layer by one kind of particle, and its phase function."""
+    """Scattering optical depth of each layer by one kind of particle, and its phase function; and
+    where there are any, or None for everywhere. Elsewhere the depth is 0, whatever changes."""
 
-    scattering: Float[Array, " layer"]
+    scattering: Float[Array, "layer *batch"]
     phase: PhaseFunction
+    there: Bool[Array, "layer *batch"] | None = None
 
 
 class OpticalProperties(eqx.Module):
@@ -55,7 +60,7 @@ class OpticalProperties(eqx.Module):
         What scatters in it, one entry for each kind of particle.
     """
 
-    extinction: Float[Array, "term layer"]
+    extinction: Float[Array, "term layer *batch"]
     weight: Float[Array, " term"]
     scatterers: tuple[Scatterer, ...]
 
@@ -78,49 +83,66 @@ class OpticalProperties(eqx.Module):
         return OpticalProperties(extinction, weight, self.scatterers + other.scatterers)
 
     @property
-    def tau(self) -> Float[Array, "term layer"]:
+    def tau(self) -> Float[Array, "term layer *batch"]:
         """Extinction optical depth of each layer. [-]"""
         return self.extinction
 
     @property
-    def scattering(self) -> Float[Array, " layer"]:
+    def scattering(self) -> Float[Array, "layer *batch"]:
         """Scattering optical depth of each layer. [-]"""
         return sum((s.scattering for s in self.scatterers), jnp.zeros_like(self.extinction[0]))
 
     @property
-    def ssa(self) -> Float[Array, "term layer"]:
+    def ssa(self) -> Float[Array, "term layer *batch"]:
         """Single-scattering albedo, 0 in an empty layer. [-]"""
         return safe_divide(self.scattering, self.extinction)
 
-    def moments(self, num_moments: int) -> Float[Array, "layer moment"]:
+    def moments(self, num_moments: int) -> Float[Array, "layer moment *batch"]:
         """Legendre moments of the mixture, weighted by scattering; 1, 0, 0, ... where none. [-]"""
-        shape = self.extinction.shape[1], num_moments
+        num_axes = self.extinction.ndim
 
-        def of_kind(shares: Array, phase: PhaseFunction) -> Array:
-            return shares[:, None] * jnp.broadcast_to(phase.moments(num_moments), shape)
+        def of_kind(share: Array, phase: PhaseFunction) -> Array:
+            return share[:, None] * trailing(phase.moments(num_moments), num_axes)
 
-        found = jnp.broadcast_to(self._mean(of_kind), shape)
-        return jnp.where(np.arange(num_moments) == 0, 1, found)
+        layers, *batch = self.extinction.shape[1:]
+        found = jnp.broadcast_to(self._mean(of_kind), (layers, num_moments, *batch))
+        first = np.arange(num_moments) == 0
+        return jnp.where(trailing(first, num_axes - 1), 1, found)
 
-    def phase_function(self, cos_scattering: Float[Array, ""]) -> Float[Array, " layer"]:
+    def phase_function(
+        self, cos_scattering: Float[Array, "*batch"]
+    ) -> Float[Array, "layer *batch"]:
         """Phase function of the mixture, weighted by scattering; 0 where nothing scatters. [-]"""
 
-        def of_kind(shares: Array, phase: PhaseFunction) -> Array:
-            return shares * phase(cos_scattering)
+        def of_kind(share: Array, phase: PhaseFunction) -> Array:
+            return share * phase(cos_scattering)
 
         return jnp.broadcast_to(self._mean(of_kind), self.extinction.shape[1:])
 
     def _mean(self, of_kind: Callable[[Array, PhaseFunction], Array]) -> Array:
-        """Sum over the scatterers by their shares, those of a kind as one batch; 0 of none."""
-        scattering = self.scattering
-        kinds: dict[Any, list[Scatterer]] = {}
-        for scatterer in self.scatterers:
-            kinds.setdefault(jax.tree.structure(scatterer.phase), []).append(scatterer)
-        found = []
-        for same in kinds.values():
-            shares = safe_divide(jnp.stack([s.scattering for s in same]), scattering)
-            phases = jax.tree.map(
-                lambda *x: jnp.stack(jnp.broadcast_arrays(*x)), *(s.phase for s in same)
-            )
-            found += jnp.unstack(jax.vmap(of_kind)(shares, phases))
-        return sum(found[1:], start=found[0]) if found else jnp.zeros((), scattering.dtype)
+        """Sum over the scatterers by their shares, of each in the layers where it is; 0 of none.
+
+        Layer by layer: of a cloud nothing is computed, value or slope, in a layer without it.
+        """
+        if not self.scatterers:
+            return jnp.zeros((), self.extinction.dtype)
+        layers = self.extinction.shape[1]
+        leaves, structure = jax.tree.flatten([s.phase for s in self.scatterers])
+        by_layer = [np.ndim(x) > 0 and x.shape[0] == layers for x in leaves]
+
+        def of_layers(
+            rows: tuple[list[Array], list[Array]], present: list[Present]
+        ) -> Float[Array, "layer ..."]:
+            scattering, own = rows[0], iter(rows[1])
+            shared = [next(own) if x else y for x, y in zip(by_layer, leaves, strict=True)]
+            phases = jax.tree.unflatten(structure, shared)
+            each, all_of_it = zip(present, scattering, phases, strict=True), total(scattering)
+            return total([if_present(x, of_kind, safe_divide(s, all_of_it), p) for x, s, p in each])
+
+        rows = [s.scattering for s in self.scatterers], list(itertools.compress(leaves, by_layer))
+        return row_by_row(of_layers, rows, [s.there for s in self.scatterers])
+
+
+def trailing(x: Any, num_axes: int) -> Any:
+    """An array with so many axes, those that it lacks of length 1 behind its own."""
+    return x.reshape(*x.shape, *(1,) * (num_axes - x.ndim))

@@ -141,14 +141,12 @@ class _Depths(NamedTuple):
         return None
 
     def value(self, leaves: Leaves) -> Array:
-        def of_one(leaves: list[Array]) -> Array:
-            state = jax.tree.unflatten(self.structure, leaves).state
-            settings = self.options.settings
-            num_moments = settings.num_streams + 1
-            groups = columns_of_bands(state, self.options.bands, settings.gases, num_moments)
-            return jnp.max(jnp.stack([jnp.max(x.arguments["tau"]) for x in groups]))
-
-        return jax.vmap(of_one, in_axes=-1)(list(leaves))
+        state = jax.tree.unflatten(self.structure, leaves).state
+        settings = self.options.settings
+        num_moments = settings.num_streams + 1
+        groups = columns_of_bands(state, self.options.bands, settings.gases, num_moments)
+        deepest = [jnp.max(x.arguments["tau"], axis=(0, 1)) for x in groups]
+        return jnp.max(jnp.stack(deepest), axis=0)
 
     def value_and_slopes(self, leaves: Leaves, wanted: tuple[bool, ...]) -> Any:
         raise TypeError("what is read to choose a program has no derivative.")

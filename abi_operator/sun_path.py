@@ -24,10 +24,10 @@ FLAT_ZENITH, SPHERICAL_ZENITH = np.radians(65.0).item(), np.radians(70.0).item()
 
 
 def sun_secant(
-    height: Float[Array, " level"],
-    solar_zenith: Float[Array, ""],
-    tau: Float[Array, "term layer"],
-) -> Float[Array, "term layer"]:
+    height: Float[Array, "level *batch"],
+    solar_zenith: Float[Array, "*batch"],
+    tau: Float[Array, "term layer *batch"],
+) -> Float[Array, "term layer *batch"]:
     r"""By what each layer attenuates the sun's beam, over its optical depth. [-]
 
     .. math::
@@ -50,4 +50,6 @@ def sun_secant(
     x = jnp.clip((solar_zenith - FLAT_ZENITH) / (SPHERICAL_ZENITH - FLAT_ZENITH), 0, 1)
     share = x * x * (3 - 2 * x)
     # No difference of the two: near the horizon the sphere's is lost beside 1 / mu0.
-    return (1 - share) * flat + share * slant_path_secant(height, mu0, tau=tau)
+    by_column = jnp.moveaxis(height, 0, -1), mu0
+    sphere = slant_path_secant(*by_column, tau=jnp.moveaxis(tau, 1, -1))
+    return (1 - share) * flat + share * jnp.moveaxis(sphere, -1, 1)

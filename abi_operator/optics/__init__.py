@@ -5,8 +5,8 @@ the top: `rayleigh` for air, `gas_absorption` for its gases, `aerosol` for one p
 for the aerosol beside plumes, `liquid_cloud` for droplets, `hydrometeor` for a class of any other
 particles. They are added with ``+``; `column_optics` adds them all. `smoke` and `ash` make plumes
 with published optics, every number of which can be replaced, `mie_plume` one whose optics follow
-from the size of its particles. The functions are written for one column and know neither streams
-nor surface: batch them with `jax.vmap`.
+from the size of its particles. The functions read as of one column, and a batch of
+columns has its axes behind those of every array; they know neither streams nor surface.
 """
 
 from .aerosol import aerosol as aerosol

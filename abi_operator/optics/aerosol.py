@@ -13,8 +13,8 @@ from .phase import HenyeyGreenstein
 
 
 def overlap(
-    height: Float[Array, " level"], base: Float[Array, ""], top: Float[Array, ""]
-) -> Float[Array, " layer"]:
+    height: Float[Array, "level *batch"], base: Float[Array, "*batch"], top: Float[Array, "*batch"]
+) -> Float[Array, "layer *batch"]:
     r"""Length of each layer that lies between `base` and `top`.
 
     .. math:: h_k = c(z_k) - c(z_{k+1}), \qquad
@@ -34,7 +34,7 @@ def overlap(
     """
     clipped = jnp.where(height >= top, top, jnp.where(height <= base, base, height))
     # An edge that is no number is nowhere, and would leave all of the column to the plume.
-    return jnp.where(jnp.isnan(top - base), jnp.nan, -jnp.diff(clipped))
+    return jnp.where(jnp.isnan(top - base), jnp.nan, -jnp.diff(clipped, axis=0))
 
 
 def aerosol(atmosphere: Atmosphere, plume: str, band: AnyBand) -> OpticalProperties:
@@ -69,14 +69,16 @@ def aerosol(atmosphere: Atmosphere, plume: str, band: AnyBand) -> OpticalPropert
         radius = properties.effective_radius_um
         spheres = mie_optics(properties.species, radius, band.name)
         relative, ssa = spheres.relative_extinction, 1 - spheres.coalbedo
-        phase = MiePhase(radius, properties.species, band.name)
+        phase = MiePhase(radius[None], properties.species, band.name)
     else:
         relative, ssa, asymmetry = _specified(properties, plume, band)
-        phase = HenyeyGreenstein(asymmetry)
+        phase = HenyeyGreenstein(asymmetry[None])
     coefficient = properties.brightness * properties.extinction_550 * relative
     above_ground = atmosphere.height - atmosphere.height[-1]
     extinction = coefficient * overlap(above_ground, properties.base, properties.top)
-    scatterer = Scatterer(ssa * extinction, phase)
+    outside = (above_ground[:-1] <= properties.base) | (above_ground[1:] >= properties.top)
+    there = jnp.asarray(~outside)  # of edges that are no numbers nobody knows
+    scatterer = Scatterer(ssa * extinction, phase, there)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 
@@ -108,8 +110,8 @@ def background(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     relative, ssa, asymmetry = _specified(properties, "background", band)
     above_ground = atmosphere.height - atmosphere.height[-1]
     beneath = -jnp.expm1(-above_ground / properties.scale_height)
-    extinction = relative * properties.aod_550 * safe_divide(-jnp.diff(beneath), beneath[0])
-    scatterer = Scatterer(ssa * extinction, HenyeyGreenstein(asymmetry))
+    extinction = relative * properties.aod_550 * safe_divide(-jnp.diff(beneath, axis=0), beneath[0])
+    scatterer = Scatterer(ssa * extinction, HenyeyGreenstein(asymmetry[None]))
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 

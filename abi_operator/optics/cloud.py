@@ -8,12 +8,12 @@ from ..bands import AnyBand, OneOf, constants, first_missing, one_of
 from ..constants import WATER_DENSITY
 from ..optical_properties import OpticalProperties, Scatterer
 from .anomalous_diffraction import Matter, matter, mean_efficiencies
-from .droplets import NU, effective_radius
+from .droplets import NU, effective_radius, is_cloudy
 from .mie_aerosol import mie_optics
 from .mie_phase import MiePhase
 from .mie_table import DROPLETS, mie_table
 from .phase import HenyeyGreenstein
-from .pointwise import pointwise
+from .pointwise import where_occupied
 from .water import EFFECTIVE_RADIUS_UM, REFRACTIVE_INDEX, droplet_asymmetry
 
 # Radius at which the formulas are evaluated, to no effect, where there is no cloud. [m]
@@ -45,24 +45,25 @@ def liquid_cloud(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     """
     if missing := first_missing(band.name, REFRACTIVE_INDEX):
         raise ValueError(f"no water index for band {missing!r}; have {list(REFRACTIVE_INDEX)}.")
-    radius = effective_radius(atmosphere.liquid)
-    cloudy = ~(radius <= 0)  # Where a state is no number nothing is, the cloud no less.
+    cloudy = is_cloudy(atmosphere.liquid)
+    radius = effective_radius(atmosphere.liquid, cloudy)
     radius = jnp.where(cloudy, radius, radius.dtype.type(_IDLE_RADIUS))
     radius_um = 1e6 * radius
     if atmosphere.liquid.optics == "mie":
-        droplets = mie_optics(DROPLETS, radius_um, band.name)
+        droplets = mie_optics(DROPLETS, radius_um, band.name, cloudy)
         q_ext = droplets.relative_extinction
         q_abs = q_ext * droplets.coalbedo
         phase = MiePhase(radius_um, DROPLETS, band.name)
     else:
         water = constants(lambda x: matter(REFRACTIVE_INDEX[x]), band.name, radius.dtype)
         name = one_of(band.name)
-        q_ext, q_abs, asymmetry = _mitchell(radius_um, band.wavelength_um, water, name)
+        own = band.wavelength_um, water, name
+        q_ext, q_abs, asymmetry = _mitchell(cloudy, (radius_um,), *own)
         phase = HenyeyGreenstein(asymmetry)
     mass = jnp.where(cloudy, atmosphere.liquid.mass_path, 0)
     cross_section = 3 * mass / (4 * WATER_DENSITY * radius)
     extinction = cross_section * q_ext
-    scatterer = Scatterer(extinction - cross_section * q_abs, phase)
+    scatterer = Scatterer(extinction - cross_section * q_abs, phase, cloudy)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 
@@ -78,7 +79,7 @@ def fitted_radii_um(liquid: LiquidCloud) -> tuple[float, float]:
     return float(EFFECTIVE_RADIUS_UM[0]), float(EFFECTIVE_RADIUS_UM[-1])
 
 
-@pointwise
+@where_occupied
 def _mitchell(
     radius_um: Array, wavelength_um: float | Array, water: Matter, band: OneOf
 ) -> tuple[Array, Array, Array]:

@@ -8,13 +8,14 @@ variance 1 / (nu + 3) of 0.1. Of such droplets
 """
 
 import math
+from typing import Any
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..atmosphere import LiquidCloud
 from ..constants import WATER_DENSITY
-from .pointwise import choose, pointwise
+from .pointwise import choose, where_occupied
 
 # Shape of the gamma distribution, nu. [-] (effective variance 0.1: Hansen 1971,
 # doi:10.1175/1520-0469(1971)028<1400:MSOPLI>2.0.CO;2)
@@ -29,7 +30,25 @@ _UNIT_MASS = math.pi / 6 * WATER_DENSITY * (NU + 1) * (NU + 2) * (NU + 3) * (2 /
 _UNIT_RADIUS = _UNIT_MASS ** (-1 / 3)
 
 
-def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
+def is_cloudy(liquid: LiquidCloud) -> Bool[Array, "*n"]:
+    """Where there are droplets: where mass and number are above 0, or no numbers.
+
+    Parameters
+    ----------
+    liquid
+        Mass and number of the droplets. [kg m-2], [m-2]
+    """
+    # What is no number is no empty layer, and what follows from it is no number either.
+    return jnp.asarray(_is_cloudy(liquid.mass_path, liquid.number_path))
+
+
+def _is_cloudy(mass: Any, number: Any) -> Any:
+    return ~((mass <= 0) | ((mass > 0) & (number <= 0)))
+
+
+def effective_radius(
+    liquid: LiquidCloud, there: Bool[Array, "layer *batch"] | None = None
+) -> Float[Array, "*n"]:
     r"""Effective radius of the droplets; 0, with derivative 0, in a layer without cloud. [m]
 
     It is what mass and number say, r, from 1 to 100 um. Beyond, mass is kept and r bends towards
@@ -46,14 +65,16 @@ def effective_radius(liquid: LiquidCloud) -> Float[Array, "*batch layer"]:
     ----------
     liquid
         Mass and number of the droplets. [kg m-2], [m-2]
+    there
+        Where there are any (`is_cloudy`), of arrays whose first axis is that of layers; None not to
+        leave out what is empty (`pointwise.where_occupied`).
     """
-    return _radius(liquid.mass_path, liquid.number_path)
+    return _radius(there, (liquid.mass_path, liquid.number_path))
 
 
-@pointwise
+@where_occupied
 def _radius(mass: Float[Array, "*n"], number: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    # What is no number is no empty layer, and what follows from it is no number either.
-    cloudy = ~((mass <= 0) | ((mass > 0) & (number <= 0)))
+    cloudy = _is_cloudy(mass, number)
     small = cloudy & (mass <= number * (_UNIT_MASS * SMALLEST_RADIUS**3))
     large = cloudy & (mass >= number * (_UNIT_MASS * LARGEST_RADIUS**3))
     # Roots are divided, and not masses, as the derivative of a quotient squares its denominator; of

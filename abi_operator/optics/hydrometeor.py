@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -35,7 +35,7 @@ from .ice import (
 )
 from .ice_tables import FU, FU_RANGE_UM, ICE_INDEX, Fu
 from .phase import HenyeyGreenstein, TwoTermHenyeyGreenstein
-from .pointwise import choose, pointwise
+from .pointwise import choose, where_occupied
 
 # Beyond a limit of size the logarithm of size goes on by this much at most. [-]
 _BEND = 0.5
@@ -81,14 +81,15 @@ def hydrometeor(
         raise ValueError(f"no index of ice and water for {missing!r}; have {list(ICE_INDEX)}.")
     particles = atmosphere.hydrometeors[name]
     optics, habit = class_optics(name, classes, particles)
-    present, radius = _radius(particles, optics, habit)
+    present = jnp.asarray(_present(particles.mass_path, particles.number_path))
+    radius = _radius(particles, optics, habit, present)
     mass = jnp.where(present, particles.mass_path, 0)
-    seen = _seen(radius, optics, habit, band)
+    seen = _seen(present, radius, optics, habit, band)
     extinction = mass * seen.extinction
     phase = HenyeyGreenstein(seen.asymmetry)
     if optics.asymmetry in TWO_LOBES:
         phase = TwoTermHenyeyGreenstein(seen.lobe, seen.asymmetry, seen.share)
-    scatterer = Scatterer(extinction - mass * seen.absorption, phase)
+    scatterer = Scatterer(extinction - mass * seen.absorption, phase, present)
     return OpticalProperties(extinction[None, :], jnp.ones(1, extinction.dtype), (scatterer,))
 
 
@@ -104,8 +105,8 @@ def particle_radius(
     name, classes
         Name of the class, and what is assumed of each.
     """
-    present, radius = _radius(particles, *class_optics(name, classes))
-    return jnp.where(present, radius, 0)
+    present = _present(particles.mass_path, particles.number_path)
+    return jnp.where(present, _radius(particles, *class_optics(name, classes)), 0)
 
 
 def from_effective_radius(
@@ -158,28 +159,30 @@ def outside_fitted_range(
         tau = hydrometeor(atmosphere, name, band, classes).tau[0]
         particles = atmosphere.hydrometeors[name]
         optics, habit = class_optics(name, classes, particles)
-        _, radius = _radius(particles, optics, habit)
+        radius = _radius(particles, optics, habit)
         smallest, largest = _fitted_radii(optics)
         total = total + jnp.sum(tau)
         outside = outside + jnp.sum(jnp.where((radius < smallest) | (radius > largest), tau, 0))
     return safe_divide(outside, total)
 
 
-def _radius(particles: Hydrometeor, optics: ClassOptics, habit: Habit) -> tuple[Array, Array]:
-    """Whether there are particles, and their effective radius, bent at the limits. [m]"""
-    mass, number = particles.mass_path, particles.number_path
+def _radius(
+    particles: Hydrometeor, optics: ClassOptics, habit: Habit, there: Array | None = None
+) -> Array:
+    """Effective radius, bent at the limits; of layers first, `there` leaves out empty ones. [m]"""
     limits = optics.smallest_radius, optics.largest_radius
-    return _present(mass, number), _bent_radius(mass, number, habit, optics.nu, limits)
+    amounts = particles.mass_path, particles.number_path
+    return _bent_radius(there, amounts, habit, optics.nu, limits)
 
 
-def _present(mass: Array, number: Array) -> Array:
+def _present(mass: Any, number: Any) -> Any:
     # Below it the reciprocal, which a derivative needs, is not finite. What is no number is not
     # empty, and what follows from it is no number either.
     tiny = np.finfo(mass.dtype).tiny * 4
     return ~((mass <= tiny) | ((mass > tiny) & (number <= tiny)))
 
 
-@pointwise
+@where_occupied
 def _bent_radius(
     mass: Array, number: Array, habit: Habit, nu: float | Array, limits: tuple[float, float]
 ) -> Array:
@@ -206,12 +209,13 @@ class _Seen(NamedTuple):
     lobe: Array
 
 
-def _seen(radius: Array, optics: ClassOptics, habit: Habit, band: AnyBand) -> _Seen:
+def _seen(present: Array, radius: Array, optics: ClassOptics, habit: Habit, band: AnyBand) -> _Seen:
     """What is seen of a class, by effective radius."""
     dtype, given = radius.dtype, optics.asymmetry
     index = water.REFRACTIVE_INDEX if is_water(habit) else ICE_INDEX
     seen = _of_radius(
-        radius,
+        present,
+        (radius,),
         band.wavelength_um,
         constants(lambda name: matter(index[name]), band.name, dtype),
         constants(FU.__getitem__, band.name, dtype),
@@ -229,7 +233,7 @@ def _seen(radius: Array, optics: ClassOptics, habit: Habit, band: AnyBand) -> _S
     return seen
 
 
-@pointwise
+@where_occupied
 def _of_radius(
     radius: Array,
     wavelength_um: float | Array,

@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..bands import AnyName, OneOf, one_of
 from .mie_table import mie_table, stacked
-from .pointwise import pointwise
+from .pointwise import where_occupied
 from .radius_cubics import locate, read
 
 
@@ -29,7 +29,12 @@ class MieOptics(NamedTuple):
     asymmetry: Float[Array, "*n"]
 
 
-def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: AnyName) -> MieOptics:
+def mie_optics(
+    species: str,
+    effective_radius_um: Float[Array, "*n"],
+    band: AnyName,
+    there: Bool[Array, "*n"] | None = None,
+) -> MieOptics:
     r"""Optics of lognormal distributions of spheres, from the table of their species.
 
     Extinction is per volume of particles, :math:`\int Q\, \pi r^2\, n(r)\, dr / \int r^3\, n\, dr`,
@@ -50,16 +55,19 @@ def mie_optics(species: str, effective_radius_um: Float[Array, "*n"], band: AnyN
         Effective radius. [um]
     band
         Name of the band.
+    there
+        Where there are any, of layers in the first axis; None for everywhere
+        (`pointwise.where_occupied`).
 
     References
     ----------
     .. [1] G. Mie, "Beitraege zur Optik trueber Medien, speziell kolloidaler Metalloesungen", Ann.
        Phys., 330, 377-445, 1908, doi:10.1002/andp.19083300302
     """
-    return MieOptics(*_interpolated(effective_radius_um, species, one_of(band)))
+    return MieOptics(*_interpolated(there, (effective_radius_um,), species, one_of(band)))
 
 
-@pointwise
+@where_occupied
 def _interpolated(radius_um: Array, species: str, band: OneOf) -> tuple[Array, Array, Array]:
     row, weights = locate(radius_um, mie_table(species).effective_radius_um)
     table, first = stacked(species, band, lambda x: x.efficiencies)

@@ -10,19 +10,20 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..optical_properties import PhaseFunction
+from ..optical_properties import PhaseFunction, trailing
 from .pointwise import choose, pointwise
 
 _BLOCK = 16  # powers that are products of x^1, x^2, x^4 and x^8
 
 
 @pointwise
-def _powers(x: Float[Array, "layer 1"], start: int, stop: int, step: int) -> Array:
+def _powers(x: Float[Array, "layer 1 *batch"], start: int, stop: int, step: int) -> Array:
     """Powers of numbers, products of x^1, x^2, x^4 ...: few operations to compile, and no loop."""
     left, square = np.arange(start, stop, step), x
-    product = jnp.ones((x.shape[0], left.size), x.dtype)
+    product = jnp.ones((x.shape[0], left.size, *x.shape[2:]), x.dtype)
     while np.any(left):
-        product = product * choose(jnp.asarray(left % 2 == 1), square, 1.0)
+        odd = jnp.asarray(trailing(left % 2 == 1, x.ndim - 1))
+        product = product * choose(odd, square, 1.0)
         left, square = left // 2, square * square
     return product
 
@@ -33,8 +34,8 @@ def _all_powers(g: Array, num_moments: int) -> Array:
     # Long series are short ones times powers: one product a moment.
     low, blocks = _powers(g[:, None], 0, _BLOCK, 1), -(-num_moments // _BLOCK)
     high = _powers(g[:, None], 0, blocks * _BLOCK, _BLOCK)
-    moments = high[:, :, None] * low[:, None, :]
-    return moments.reshape(g.shape[0], -1)[:, :num_moments]
+    moments = high[:, :, None] * low[:, None]
+    return moments.reshape(g.shape[0], -1, *g.shape[1:])[:, :num_moments]
 
 
 @final
@@ -54,13 +55,13 @@ class HenyeyGreenstein(PhaseFunction):
        70-83, 1941, doi:10.1086/144246
     """
 
-    asymmetry: Float[Array, ""] | Float[Array, " layer"]
+    asymmetry: Float[Array, ""] | Float[Array, "#layer *batch"]
 
-    def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
+    def moments(self, num_moments: int) -> Float[Array, "#layer moment *#batch"]:
         r"""Legendre moments g\ :sup:`l`, as products: the derivative at g = 0 is exact."""
         return _all_powers(jnp.atleast_1d(self.asymmetry), num_moments)
 
-    def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
+    def __call__(self, cos_scattering: Float[Array, "*batch"]) -> Float[Array, "#layer *batch"]:
         """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
         return _henyey_greenstein(jnp.atleast_1d(self.asymmetry), cos_scattering)
 
@@ -96,16 +97,16 @@ class TwoTermHenyeyGreenstein(PhaseFunction):
         Share D of the first lobe, of each layer. [-]
     """
 
-    first: Float[Array, " layer"]
-    second: Float[Array, " layer"]
-    share: Float[Array, " layer"]
+    first: Float[Array, "layer *batch"]
+    second: Float[Array, "layer *batch"]
+    share: Float[Array, "layer *batch"]
 
-    def moments(self, num_moments: int) -> Float[Array, "layer moment"]:
+    def moments(self, num_moments: int) -> Float[Array, "layer moment *batch"]:
         """Legendre moments. [-]"""
         one, other = (_all_powers(g, num_moments) for g in (self.first, self.second))
         return self.share[:, None] * one + (1 - self.share)[:, None] * other
 
-    def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " layer"]:
+    def __call__(self, cos_scattering: Float[Array, "*batch"]) -> Float[Array, "layer *batch"]:
         """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
         return _two_lobes(self.first, self.second, self.share, cos_scattering)
 
@@ -134,15 +135,18 @@ class RayleighPhase(PhaseFunction):
        Rev., 16, 527-610, 1974, doi:10.1007/BF00168069
     """
 
-    beta2: Float[Array, ""] | Float[Array, " layer"]
+    beta2: Float[Array, ""] | Float[Array, "#layer *batch"]
 
-    def moments(self, num_moments: int) -> Float[Array, "#layer moment"]:
+    def moments(self, num_moments: int) -> Float[Array, "#layer moment *#batch"]:
         """Legendre moments 1, 0, beta2 / 5, 0, ... [-]"""
         beta2 = jnp.atleast_1d(self.beta2)[:, None]
-        isotropic = jnp.asarray(np.eye(1, num_moments), beta2.dtype)
-        second = jnp.asarray(np.eye(1, num_moments, k=2), beta2.dtype)
+        isotropic, second = (
+            jnp.asarray(trailing(np.eye(1, num_moments, k=k), beta2.ndim), beta2.dtype)
+            for k in (0, 2)
+        )
         return isotropic + beta2 / 5 * second
 
-    def __call__(self, cos_scattering: Float[Array, ""]) -> Float[Array, " #layer"]:
+    def __call__(self, cos_scattering: Float[Array, "*batch"]) -> Float[Array, "#layer *batch"]:
         """Phase function; `cos_scattering` is 1 straight ahead. [-]"""
-        return 1 + jnp.atleast_1d(self.beta2) * (3 * cos_scattering**2 - 1) / 2
+        beta2 = trailing(jnp.atleast_1d(self.beta2), 1 + jnp.ndim(cos_scattering))
+        return 1 + beta2 * (3 * cos_scattering**2 - 1) / 2

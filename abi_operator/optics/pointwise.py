@@ -15,6 +15,7 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array
 
 from ..machine.algebra import fenced, total
+from ..machine.occupied import Present, if_present, row_by_row
 
 _STATIC = bool, float, int, str
 
@@ -31,19 +32,52 @@ def pointwise(function: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     def call(*args: Any) -> Any:
-        given, structure = jax.tree.flatten(args)
-        fixed = tuple(x if isinstance(x, _STATIC) else None for x in given)
-        value = _with_rule(function, structure, fixed)
-        return value(*(x for x in given if not isinstance(x, _STATIC)))
+        return _called(function, None, (), args)
 
     return call
 
 
+def where_occupied(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same of layers, of which those that nothing is in are not computed.
+
+    It is called with, before all other arguments, where anything is, ``layer *batch`` or None for
+    everywhere, and a tuple of those arrays that have an axis of layers first, as the result has.
+    In a layer in which there is nothing in any column of a batch values and slopes are 0.
+
+    Parameters
+    ----------
+    function
+        As for `pointwise`, of each of the arrays that have an axis of layers, and of the others.
+    """
+
+    def call(there: Any, by_layer: tuple[Any, ...], *others: Any) -> Any:
+        return _called(function, there, by_layer, others)
+
+    return call
+
+
+def _called(
+    function: Callable[..., Any],
+    there: Any,
+    by_layer: tuple[Any, ...],
+    others: tuple[Any, ...],
+) -> Any:
+    given, structure = jax.tree.flatten((*by_layer, *others))
+    fixed = tuple(x if isinstance(x, _STATIC) else None for x in given)
+    arrays = [jnp.asarray(x) for x in given if not isinstance(x, _STATIC)]
+    if there is None:
+        return _with_rule(function, 0, structure, fixed)(*arrays)
+    return _with_rule(function, len(by_layer), structure, fixed)(jnp.asarray(there), *arrays)
+
+
 @cache
-def _with_rule(function: Callable[..., Any], structure: Any, fixed: tuple[Any, ...]) -> Callable:
+def _with_rule(
+    function: Callable[..., Any], by_layer: int, structure: Any, fixed: tuple[Any, ...]
+) -> Callable:
     """`function` of those leaves of its arguments that are arrays, the others being `fixed`.
 
-    One for all calls, so that what JAX has made of it is found again.
+    One for all calls, so that what JAX has made of it is found again. Where so many of the arrays
+    are given `by_layer`, there comes before them where anything is.
     """
 
     def of(*arrays: Array) -> Any:
@@ -52,18 +86,34 @@ def _with_rule(function: Callable[..., Any], structure: Any, fixed: tuple[Any, .
             *jax.tree.unflatten(structure, [next(rest) if x is None else x for x in fixed])
         )
 
-    value = jax.custom_jvp(fenced(of))
+    def kernel(of: Callable[..., Any]) -> Callable[..., Any]:
+        whole = fenced(of)
+        if not by_layer:
+            return whole
+
+        def some(there: Array, *arrays: Array) -> Any:
+            others = arrays[by_layer:]
+
+            def of_rows(rows: Sequence[Array], present: Sequence[Present]) -> Any:
+                return if_present(present[0], lambda *rows: whole(*rows, *others), *rows)
+
+            return row_by_row(of_rows, arrays[:by_layer], [there])
+
+        return some
+
+    value = jax.custom_jvp(kernel(of))
 
     @cache
     def with_slopes(moving: tuple[int, ...]) -> Callable[..., Any]:
-        return fenced(lambda *arrays: _with_slopes(of, arrays, moving))
+        return kernel(lambda *arrays: _with_slopes(of, arrays, moving))
 
     def rule(primals: Sequence[Array], tangents: Sequence[Any]) -> tuple[Any, Any]:
-        moving = tuple(k for k, t in enumerate(tangents) if not isinstance(t, SymbolicZero))
+        own = tangents[1:] if by_layer else tangents
+        moving = tuple(k for k, t in enumerate(own) if not isinstance(t, SymbolicZero))
         found, slopes = with_slopes(moving)(*primals)
 
         def along(*slopes: Array) -> Array:
-            terms = [x * tangents[k] for x, k in zip(slopes, moving, strict=True)]
+            terms = [x * own[k] for x, k in zip(slopes, moving, strict=True)]
             return total(terms)
 
         return found, jax.tree.map(along, *slopes)

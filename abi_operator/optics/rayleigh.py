@@ -7,6 +7,7 @@ from ..atmosphere import Atmosphere
 from ..bands import AnyBand, constants, first_missing
 from ..constants import STANDARD_PRESSURE
 from ..optical_properties import OpticalProperties, Scatterer
+from .air import counted_pressure
 from .phase import RayleighPhase
 
 # Optical depth of air down to 1013.25 hPa after the full form of Bodhaine et al. (1999), 360 ppm
@@ -115,7 +116,7 @@ def rayleigh(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
     Parameters
     ----------
     atmosphere
-        One column, of which the pressure is read (`Atmosphere.counted_pressure`). [Pa]
+        One column, of which the pressure is read (`counted_pressure`). [Pa]
     band
         Band for which the depth :math:`\tau_0` at standard pressure is tabulated, by the full form
         of Bodhaine et al. (`bodhaine1999`).
@@ -124,7 +125,7 @@ def rayleigh(atmosphere: Atmosphere, band: AnyBand) -> OpticalProperties:
         raise ValueError(f"no Rayleigh depth for band {missing!r}; have {list(STANDARD_DEPTH)}.")
     dtype = atmosphere.pressure.dtype
     per_pascal, beta2 = constants(_constants, band.name, dtype)
-    scattering = jnp.diff(atmosphere.counted_pressure) * per_pascal
+    scattering = jnp.diff(counted_pressure(atmosphere.pressure), axis=0) * per_pascal
     phase = RayleighPhase(jnp.asarray(beta2, dtype))
     return OpticalProperties(
         scattering[None, :], jnp.ones(1, dtype), (Scatterer(scattering, phase),)

@@ -168,6 +168,30 @@ def test_forward_mode_equals_reverse():
     np.testing.assert_allclose(forward(inputs, direction), along, rtol=1e-10)
 
 
+@pytest.mark.parametrize("make", [smoky, cloudy])
+def test_a_batch_behind_is_its_columns(make):
+    """With axes of a batch behind those of every array, and of all layers where there are any."""
+    state, sun = make()
+    low = dataclasses.replace(state.geometry, spherical=True, solar_zenith=jnp.asarray(1.25))
+    first = dataclasses.replace(state, geometry=low), sun
+    second = jax.tree.map(lambda x: 0.97 * x, first)
+    third = jax.tree.map(jnp.copy, first)
+    empty = jnp.zeros_like(state.atmosphere.liquid.mass_path)
+    dry = dataclasses.replace(state.atmosphere.liquid, mass_path=empty, number_path=empty)
+    air = dataclasses.replace(state.atmosphere, liquid=dry)
+    third = dataclasses.replace(third[0], atmosphere=air), sun
+    columns = [first, second, third]
+    batch = jax.tree.map(lambda *x: jnp.stack(x, axis=-1), *columns)
+    alone = jax.jit(lambda columns: [all_bands(x) for x in columns])(columns)
+    together = jax.jit(all_bands)(batch)
+    for k, column in enumerate(alone):
+        for name in NAMES:
+            for key, x in column[name].items():
+                own = together[name][key]
+                own = own if key == "weight" else own[..., k]
+                np.testing.assert_allclose(own, x, rtol=ROUNDING, err_msg=f"{name} {key}")
+
+
 @pytest.mark.slow
 def test_values_of_clouds():
     """Of arrays that all bands share."""
@@ -192,11 +216,11 @@ def test_terms_are_summed_by_weight():
     assert [group.places.count(k) for k in range(len(NAMES))] == counts == [4, 1, 4]
     weight = jnp.arange(1.0, 10.0)
     group = dataclasses.replace(group, weight=weight)
-    terms = jnp.stack([weight, 2 * weight])
+    terms = jnp.stack([weight, 2 * weight], axis=1)
     found = group.summed(terms)
     for place, name in enumerate(NAMES):
         own = np.flatnonzero(np.asarray(group.places) == place)
-        expected = np.sum(np.asarray(weight * terms)[:, own], axis=1)
+        expected = np.sum(np.asarray(weight[:, None] * terms)[own], axis=0)
         np.testing.assert_allclose(found[name], expected, rtol=1e-15)
 
 

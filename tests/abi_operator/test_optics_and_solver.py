@@ -56,6 +56,7 @@ def test_tiles_do_not_show(monkeypatch):
 
     monkeypatch.setattr(batching, "map_tiles", watched)
     monkeypatch.setattr(sizes, "_whole", lambda *_: 1)
+    monkeypatch.setattr(sizes, "_SOLVER_TILES", 8)
     for solve, expected in ((jax.jit(lambda s: solved(s)), (20, 8)), (solved, (8, 8))):
         programs_anew(monkeypatch)
         tiles.clear()
@@ -114,7 +115,7 @@ def test_depths_that_are_read_are_no_reflectances(monkeypatch):
     """
 
     def light(columns, arguments, settings):
-        return arguments["albedo"] * jnp.exp(-0.1 * jnp.sum(arguments["tau"], axis=-1))
+        return arguments["albedo"] * jnp.exp(-0.1 * jnp.sum(arguments["tau"], axis=1))
 
     monkeypatch.setattr(bands_of_states, "_terms", light)
     state = column(liquid=0.5, num_layers=2)

@@ -156,7 +156,8 @@ def test_exponential_terms_are_weighted_runs(monkeypatch):
 
     def run(depths_of, weights):
         def optics(atmosphere, band, gases):
-            gas = depths_of(atmosphere)[:, None] * jnp.ones(atmosphere.height.shape[0] - 1)
+            layers = jnp.ones_like(atmosphere.height[1:])
+            gas = depths_of(atmosphere)[:, None] * layers
             return plain(atmosphere, band, gases) + OpticalProperties(gas, jnp.asarray(weights), ())
 
         monkeypatch.setattr(band_columns, "column_optics", optics)
@@ -165,7 +166,7 @@ def test_exponential_terms_are_weighted_runs(monkeypatch):
         return brf(pair, ("C01",), num_streams=2, num_modes=1, num_doublings=0)
 
     single = run(lambda air: air.plumes["ash"].brightness[None], [1.0])
-    both = run(lambda air: jnp.asarray(grey), [0.25, 0.75])
+    both = run(lambda air: jnp.asarray(grey)[:, None], [0.25, 0.75])
     assert abs(single[1] / single[0] - 1) > 0.1
     np.testing.assert_allclose(both[0], 0.25 * single[0] + 0.75 * single[1], rtol=1e-12)
     np.testing.assert_array_equal(both[0], both[1])

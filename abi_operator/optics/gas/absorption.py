@@ -55,7 +55,8 @@ def gas_absorption(
     names = names_of(band.name)
     kinds = {_kind(a.amount): a.amount for name in names for a in _absorbers(name, gases)}
     if atmosphere.gases is None or not kinds:
-        nothing = jnp.zeros((1, atmosphere.pressure.shape[0] - 1), dtype)
+        levels, *batch = atmosphere.pressure.shape
+        nothing = jnp.zeros((1, levels - 1, *batch), dtype)
         return OpticalProperties(nothing, jnp.ones(1, dtype), ())
     terms = max(num_terms(name, gases) for name in names)
 

@@ -15,6 +15,8 @@ from jaxtyping import Array, Float
 from ..._numerics import safe_divide
 from ...atmosphere import Atmosphere, Gases
 from ...constants import STANDARD_PRESSURE
+from ...optical_properties import trailing
+from ..air import counted_pressure
 from ..pointwise import choose, pointwise
 
 _GRAVITY = 9.80665  # standard [m s-2]
@@ -23,17 +25,17 @@ _GRAVITY = 9.80665  # standard [m s-2]
 _BELIEVED, _BEND = (150.0, 325.0), (0.2, 0.3)
 
 
-def ozone_column(atmosphere: Atmosphere) -> Float[Array, " layer"]:
+def ozone_column(atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
     """Ozone of each layer. [atm-cm]"""
     return 1e-3 * gases_of(atmosphere).ozone
 
 
-def vapour_column(atmosphere: Atmosphere) -> Float[Array, " layer"]:
+def vapour_column(atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
     """Precipitable water of each layer. [cm]"""
     return 0.1 * gases_of(atmosphere).vapour
 
 
-def self_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
+def self_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
     r"""Vapour times its own pressure, as its self continuum has it. [kg m-2]
 
     .. math:: u_k\, \frac{e}{p_0} \Bigl(\frac{296\ \mathrm{K}}{T}\Bigr)^7, \qquad
@@ -44,7 +46,7 @@ def self_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
     The power of temperature is that of MT_CKD 4.3 in C06 and C07 (density has one of the seven). A
     layer of no air has none.
     """
-    air, vapour = jnp.diff(atmosphere.pressure), gases_of(atmosphere).vapour
+    air, vapour = jnp.diff(atmosphere.pressure, axis=0), gases_of(atmosphere).vapour
     humidity = safe_divide(_GRAVITY * vapour, air)
     own = humidity * _middle(atmosphere.pressure) / (0.622 + 0.378 * humidity)
     return vapour * (own / STANDARD_PRESSURE) * (296 / _middle(temperature_of(atmosphere))) ** 7
@@ -56,7 +58,7 @@ class MixedGas(NamedTuple):
     .. math:: \frac{X}{X_0} \left(\frac{p_{k+1}}{p_0}\right)^{1 + n}
        - \frac{X}{X_0} \left(\frac{p_k}{p_0}\right)^{1 + n}, \qquad p_0 = 1013.25\ \mathrm{hPa}
 
-    where :math:`p_k` of the first level counts as 0 (`Atmosphere.counted_pressure`): the gas above
+    where :math:`p_k` of the first level counts as 0 (`counted_pressure`): the gas above
     it is in the uppermost layer.
 
     Parameters
@@ -74,10 +76,10 @@ class MixedGas(NamedTuple):
     reference: float | Array
     exponent: float | Array
 
-    def __call__(self, atmosphere: Atmosphere) -> Float[Array, " layer"]:
+    def __call__(self, atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
         return amounts_of(atmosphere, [self])[0]
 
-    def of_path(self, atmosphere: Atmosphere, path: Float[Array, " layer"]) -> Array:
+    def of_path(self, atmosphere: Atmosphere, path: Float[Array, "layer *batch"]) -> Array:
         """Amount, by that of a gas of which there is the mole fraction X_0."""
         if self.name is None:
             return path
@@ -98,10 +100,10 @@ class ScaledVapour(NamedTuple):
     reference_pressure: float | Array
     exponent: float | Array
 
-    def __call__(self, atmosphere: Atmosphere) -> Float[Array, " layer"]:
+    def __call__(self, atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
         return amounts_of(atmosphere, [self])[0]
 
-    def of_path(self, atmosphere: Atmosphere, path: Float[Array, " layer"]) -> Array:
+    def of_path(self, atmosphere: Atmosphere, path: Float[Array, "layer *batch"]) -> Array:
         """Amount, by vapour times the power of pressure."""
         return path
 
@@ -128,26 +130,28 @@ class WarmVapour(NamedTuple):
     linear: float | Array
     quadratic: float | Array
 
-    def __call__(self, atmosphere: Atmosphere) -> Float[Array, " layer"]:
+    def __call__(self, atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
         return amounts_of(atmosphere, [self])[0]
 
-    def of_path(self, atmosphere: Atmosphere, path: Float[Array, " layer"]) -> Array:
+    def of_path(self, atmosphere: Atmosphere, path: Float[Array, "layer *batch"]) -> Array:
         """Amount, by vapour times the power of pressure."""
         x = _believed(_middle(temperature_of(atmosphere)) / 250 - 1)
         return path * (1 + x * (self.linear + x * self.quadratic))
 
 
-def foreign_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, " layer"]:
+def foreign_continuum_vapour(atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
     r"""Vapour times density of air relative to 296 K and 1013.25 hPa. [kg m-2]"""
     relative = _middle(atmosphere.pressure) / STANDARD_PRESSURE
     return gases_of(atmosphere).vapour * relative * (296 / _middle(temperature_of(atmosphere)))
 
 
-Amount = Callable[[Atmosphere], Float[Array, " layer"]] | MixedGas | ScaledVapour | WarmVapour
+Amount = Callable[[Atmosphere], Float[Array, "layer *batch"]] | MixedGas | ScaledVapour | WarmVapour
 """A function, or a power of pressure with numbers of its own."""
 
 
-def amounts_of(atmosphere: Atmosphere, wanted: Sequence[Amount]) -> list[Float[Array, " layer"]]:
+def amounts_of(
+    atmosphere: Atmosphere, wanted: Sequence[Amount]
+) -> list[Float[Array, "layer *batch"]]:
     """Amounts in the layers of one column, with the powers of pressure of all taken at once."""
     by_levels = [x for x in wanted if isinstance(x, MixedGas)]
     by_layers = [x for x in wanted if isinstance(x, ScaledVapour | WarmVapour)]
@@ -165,12 +169,12 @@ def amounts_of(atmosphere: Atmosphere, wanted: Sequence[Amount]) -> list[Float[A
 
 
 def _mixed_paths(atmosphere: Atmosphere, amounts: Sequence[MixedGas]) -> Sequence[Array]:
-    relative = atmosphere.counted_pressure / STANDARD_PRESSURE
+    relative = counted_pressure(atmosphere.pressure) / STANDARD_PRESSURE
     exponent = _column([x.exponent for x in amounts], relative)
-    paths = jnp.diff(relative * _power(relative[None], exponent))
+    paths = jnp.diff(relative * _power(relative[None], exponent), axis=1)
     # Where a product and the difference are joined in one rounding, levels at one pressure (and
     # those an ulp apart) have a little less than nothing between them.
-    rounding = jnp.where(jnp.diff(relative) >= 0, jnp.minimum(paths, 0), 0)
+    rounding = jnp.where(jnp.diff(relative, axis=0) >= 0, jnp.minimum(paths, 0), 0)
     return jnp.unstack(paths - jax.lax.stop_gradient(rounding))
 
 
@@ -182,8 +186,8 @@ def _vapour_paths(
     return jnp.unstack(vapour * _power(relative, _column([x.exponent for x in amounts], pressure)))
 
 
-def _column(numbers: Sequence[float | Array], like: Array) -> Float[Array, "amount 1"]:
-    return jnp.stack([jnp.asarray(x, like.dtype) for x in numbers])[:, None]
+def _column(numbers: Sequence[float | Array], like: Array) -> Float[Array, "amount #layer *#batch"]:
+    return trailing(jnp.stack([jnp.asarray(x, like.dtype) for x in numbers]), 1 + like.ndim)
 
 
 def gases_of(atmosphere: Atmosphere) -> Gases:
@@ -193,7 +197,7 @@ def gases_of(atmosphere: Atmosphere) -> Gases:
     return atmosphere.gases
 
 
-def temperature_of(atmosphere: Atmosphere) -> Float[Array, " level"]:
+def temperature_of(atmosphere: Atmosphere) -> Float[Array, "level *batch"]:
     """Temperature of the levels, or `ValueError` where the atmosphere has none. [K]"""
     if atmosphere.temperature is None:
         raise ValueError("absorption by vapour in this band needs atmosphere.temperature.")
@@ -207,7 +211,7 @@ def _power(x: Array, exponent: Array) -> Array:
     return choose(x > 0, power, (exponent == 0).astype(x.dtype))
 
 
-def _believed(x: Float[Array, " layer"]) -> Float[Array, " layer"]:
+def _believed(x: Float[Array, "layer *batch"]) -> Float[Array, "layer *batch"]:
     """Temperature over 250 K, less 1, bent beyond those that parabolas know."""
     low, high = (limit / 250 - 1 for limit in _BELIEVED)
     under, over = x < low, x > high
@@ -217,5 +221,5 @@ def _believed(x: Float[Array, " layer"]) -> Float[Array, " layer"]:
     return jnp.where(under, colder, jnp.where(over, warmer, x))
 
 
-def _middle(level: Float[Array, " level"]) -> Float[Array, " layer"]:
+def _middle(level: Float[Array, "level *batch"]) -> Float[Array, "layer *batch"]:
     return (level[1:] + level[:-1]) / 2

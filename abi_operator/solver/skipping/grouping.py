@@ -13,12 +13,12 @@ with rational functions in place of exponentials: the first moments of what diff
 the streams' degree k, since layers with different phase functions may have one g (delta-M brings
 those of droplets of other sizes together), and the secants of a low sun, which differ over a
 spherical Earth, and by which more or less of its light is left for the layers below. (All of it is
-a share of a sun's light that stands where flat layers would have such a secant: `plan.planned`.) In thick
-layers light is scattered many times, and absorbed as often as that: d is the larger (1 - omega g)
-tau of the two, as a thin black layer counts for little under a thick white one, and for much if it
-is spread through it. From the top, each layer joins the group above it while the sum of this over
-the group's members, seen through what lies above (1 / (1 + `ATTENUATION` times its backward
-depth)), stays below what the error budget allows; else it starts a new group.
+a share of the light of a sun that stands where flat layers would have such a secant:
+`plan.planned`.) In thick layers light is scattered many times, and absorbed as often as that: d is
+the larger (1 - omega g) tau of the two, as a thin black layer counts for little under a thick white
+one, and for much if it is spread through it. From the top, each layer joins the group above it
+while the sum of this over the group's members, seen through what lies above (1 / (1 + `ATTENUATION`
+times its backward depth)), stays below what the error budget allows; else it starts a new group.
 
 A group emits as if its Planck function were linear in optical depth (`heat`). Its light is off by
 less than a quarter of the range D of the Planck function in it, of which that part counts that any

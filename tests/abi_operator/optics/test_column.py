@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
+from abi_operator.atmosphere import Hydrometeor
 from abi_operator.bands import BANDS
 from abi_operator.constants import STANDARD_PRESSURE
 from abi_operator.optics import aerosol, column_optics, liquid_cloud, rayleigh
@@ -48,6 +49,22 @@ def test_column_is_the_sum_of_its_parts(make_atmosphere):
 def test_no_plumes(make_atmosphere):
     atmosphere = make_atmosphere(plumes={})
     assert len(column_optics(atmosphere, BANDS["C03"]).scatterers) == 2
+
+
+def test_columns_of_numpy(make_atmosphere):
+    """What is read of files is given as it is."""
+    atmosphere = make_atmosphere(plumes={})
+    mass = jnp.zeros(atmosphere.height.size - 1).at[1].set(1e-3)
+    crystals = {"ice": Hydrometeor(mass, 1e9 * mass)}
+    atmosphere = dataclasses.replace(atmosphere, hydrometeors=crystals)
+
+    def flat(given):
+        optics = column_optics(given, BANDS["C06"])
+        forward = optics.phase_function(jnp.asarray(0.9))
+        return jnp.concatenate([optics.tau[0], optics.moments(5).ravel(), forward])
+
+    found = flat(jax.tree.map(np.asarray, atmosphere))
+    np.testing.assert_allclose(found, flat(atmosphere), rtol=1e-14)
 
 
 def test_vmap_of_columns(make_atmosphere):
@@ -134,7 +151,8 @@ def test_derivatives_are_finite_at_the_edges_of_the_state(make_atmosphere, chang
 def test_float32_column(make_atmosphere, band):
     atmosphere = make_atmosphere(dtype=jnp.float32)
     optics = column_optics(atmosphere, BANDS[band])
-    assert {leaf.dtype for leaf in jax.tree.leaves(optics)} == {jnp.dtype(jnp.float32)}
+    kinds = {leaf.dtype for leaf in jax.tree.leaves(optics)}  # numbers, and where there is any
+    assert kinds == {jnp.dtype(jnp.float32), jnp.dtype(bool)}
     assert "f64" not in str(jax.make_jaxpr(outputs, static_argnums=1)(atmosphere, band))
 
     pressure = np.asarray(atmosphere.pressure, np.float64)
