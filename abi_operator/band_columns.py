@@ -16,8 +16,8 @@ from .atmosphere import State
 from .bands import AnyName, SomeBand, by_band, entry, several_bands
 from .geometry import is_up
 from .lambertian import Lambertian
-from .optical_properties import trailing
-from .optics import column_optics, num_terms
+from .machine.algebra import trailing
+from .optics import mixture, num_terms
 from .planck import in_band_radiance
 from .solver import cos_scattering_angle
 from .sun_path import sun_secant
@@ -196,14 +196,15 @@ def _layers(state: State, band: SomeBand, gases: tuple[str, ...], num_moments: i
     mu0 = jnp.cos(above_horizon(geometry.solar_zenith))
     mu = jnp.cos(above_horizon(geometry.view_zenith))
     angles = mu0, mu, geometry.relative_azimuth
-    optics = column_optics(state.atmosphere, band, gases)
+    angle = cos_scattering_angle(*angles)
+    optics = mixture(state.atmosphere, band, gases, num_moments, angle)
     by_term = {"tau": optics.tau, "ssa": optics.ssa, "weight": optics.weight}
     if geometry.spherical:
         height = state.atmosphere.height
         by_term["secant"] = sun_secant(height, above_horizon(geometry.solar_zenith), optics.tau)
     shared = {
-        "moments": optics.moments(num_moments),
-        "phase_function": optics.phase_function(cos_scattering_angle(*angles)),
+        "moments": optics.moments,
+        "phase_function": optics.phase_function,
         "mu0": mu0,
         "mu": mu,
         "relative_azimuth": geometry.relative_azimuth,

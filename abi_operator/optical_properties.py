@@ -13,7 +13,6 @@ exponentials of a band's gas transmission. Grey matter has one term of weight 1.
 
 import itertools
 from collections.abc import Callable
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -22,7 +21,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ._numerics import safe_divide
-from .machine.algebra import total
+from .machine.algebra import total, trailing
 from .machine.occupied import Present, if_present, row_by_row
 
 
@@ -141,8 +140,3 @@ class OpticalProperties(eqx.Module):
 
         rows = [s.scattering for s in self.scatterers], list(itertools.compress(leaves, by_layer))
         return row_by_row(of_layers, rows, [s.there for s in self.scatterers])
-
-
-def trailing(x: Any, num_axes: int) -> Any:
-    """An array with so many axes, those that it lacks of length 1 behind its own."""
-    return x.reshape(*x.shape, *(1,) * (num_axes - x.ndim))

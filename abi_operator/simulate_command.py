@@ -125,6 +125,7 @@ def simulate(
 
 
 def print_report(report: Report, out: Path, before: list[str]) -> None:
+    """Say what was written and what was removed, and what the simulation has to say of itself."""
     for name in report.files:
         typer.echo(f"wrote {out / name}")
     for name in sorted(set(before) - set(report.files)):

@@ -33,7 +33,7 @@ from abi_operator.files import (
     wrf_coordinates,
 )
 from abi_operator.machine.speed import usable_cores
-from abi_operator.optics import column_optics
+from abi_operator.optics import mixture
 from abi_operator.pictures import write_png
 from abi_operator.products import natural_color
 from abi_operator.scene import (
@@ -72,11 +72,9 @@ def optics(states, num_moments):
         geometry = state.geometry
         angle = cos_scattering_angle(geometry.mu0, geometry.mu, geometry.relative_azimuth)
         layers = [
-            column_optics(state.atmosphere, band) for band in (BANDS[name] for name in GRASSO2013)
+            mixture(state.atmosphere, BANDS[name], (), num_moments, angle) for name in GRASSO2013
         ]
-        arrays = [
-            (x.tau[0], x.ssa[0], x.moments(num_moments), x.phase_function(angle)) for x in layers
-        ]
+        arrays = [(x.tau[0], x.ssa[0], x.moments, x.phase_function) for x in layers]
         return tuple(jax.numpy.stack(a) for a in zip(*arrays, strict=True))
 
     return jax.vmap(column)(states)

@@ -39,7 +39,7 @@ from abi_operator import (
     smoke,
     standard_atmosphere,
 )
-from abi_operator.optics import ALL_GASES, column_optics
+from abi_operator.optics import ALL_GASES, mixture
 from abi_operator.planck import in_band_radiance
 from abi_operator.satellites import solar_irradiance
 from abi_operator.settings import NUM_STREAMS
@@ -108,9 +108,9 @@ def layers_of(state, bands, gases, num_moments):
     cosine = cos_scattering_angle(*angles)
     found = []
     for band in bands:
-        optics = column_optics(state.atmosphere, BANDS[band], gases)
-        count = optics.weight.shape[0]
-        same = optics.moments(num_moments), optics.phase_function(cosine), state.albedo[band]
+        optics = mixture(state.atmosphere, BANDS[band], gases, num_moments, cosine)
+        count = optics.weight.size
+        same = optics.moments, optics.phase_function, state.albedo[band]
         terms = (jnp.broadcast_to(x, (count, *jnp.shape(x))) for x in (*same, *angles))
         found.append((optics.tau, optics.ssa, *terms, optics.weight))
     names = ("tau", "ssa", "moments", "phase_function", "albedo", "mu0", "mu", "relative_azimuth")
@@ -133,12 +133,16 @@ class Programs:
         self.options = {"num_streams": options.num_streams} | _how(options)
         self.operator = partial(door, **self.options, gases=self.gases)
         self.emitting = tuple(x for x in self.bands if door is radiance and x == "C07")
-        # Columns lie on all cores, as they do where the solver shares its tiles among them.
+        # Columns lie on all cores, and each core has its own, as in the operator.
         mesh = Mesh(np.asarray(jax.devices()[:cores]), ("core",))
         self.share = NamedSharding(mesh, PartitionSpec("core"))
         self.num_moments = options.num_streams + 1
-        self._all_optics = jax.jit(partial(self._optics, bands=self.bands))
-        self._optics_slopes = jax.jit(jax.grad(self._squares))
+        on_each = partial(jax.shard_map, mesh=mesh, in_specs=self.share.spec, check_vma=False)
+        of_all = partial(self._optics, bands=self.bands)
+        layers = jax.eval_shape(of_all, states(cores, 0, options.dtype))
+        self._all_optics = jax.jit(on_each(of_all, out_specs=jax.tree.map(_on_last_axis, layers)))
+        slopes = jax.grad(self._squares)
+        self._optics_slopes = jax.jit(on_each(slopes, out_specs=self.share.spec))
         self._solver_slopes = jax.jit(jax.grad(lambda x: jnp.sum(self._solve(x))))
         self._jacobian = jax.jit(jax.jacrev(self._summed, has_aux=True))
 
@@ -209,6 +213,11 @@ class Programs:
         """
         given = {x: self._optics(y, bands=(x,)) for x, y in copies.items()}
         return sum(jnp.sum(x**2) for x in jax.tree.leaves(given))
+
+
+def _on_last_axis(x):
+    """Where the columns of an array that the optics give are: on its last axis, if it has any."""
+    return PartitionSpec(*[None] * (x.ndim - 1), "core" if x.ndim > 1 else None)
 
 
 def _how(options):

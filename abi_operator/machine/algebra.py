@@ -67,6 +67,11 @@ def fenced(function: Callable) -> Callable:
     return call
 
 
+def trailing(x: Any, num_axes: int) -> Any:
+    """An array with so many axes, those that it lacks of length 1 behind its own."""
+    return x.reshape(*x.shape, *(1,) * (num_axes - x.ndim))
+
+
 class Entry(eqx.Module):
     """One entry of a stack, given to a kernel that reads it in its place, without a copy.
 

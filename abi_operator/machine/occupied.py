@@ -3,8 +3,10 @@
 Which rows are occupied is data, read while a program runs: a scan over the rows branches at each.
 What is mapped over by `jax.vmap` shares one answer, that of all of its columns together, so that
 the branch stays one. Backwards a row is computed again when its turn comes, in the cache: nothing
-is kept of it. Another device than a CPU has all rows at once (`backend`): a step of a loop takes it
-as long as all of them, and of thousands of columns some are everywhere.
+is kept of it. A function of rows that calls another one of rows has it branch within its own loop.
+Where several devices share a program, and not each its own columns by `jax.shard_map`, each answer
+waits for all of them. Another device than a CPU has all rows at once (`backend`): a step of a loop
+takes it as long as all of them, and of thousands of columns some are everywhere.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,8 +32,9 @@ def row_by_row(
     Parameters
     ----------
     function
-        Of arrays whose first axis is that of rows, to a tree of such arrays, every row by itself;
-        and of whether each of some things is in these rows, for `if_present`.
+        Of arrays whose first axis is that of rows, to a tree of such arrays, every row by itself
+        (a single one is not looped over); and of whether each of some things is in these rows, for
+        `if_present`.
     by_row
         Its first argument.
     there
@@ -40,6 +43,8 @@ def row_by_row(
     if is_plain() or not on_cpu():
         return function(by_row, [None] * len(there))
     occupied = [None if x is None else _anywhere(x) for x in there]
+    if len(jax.tree.leaves(by_row)[0]) == 1:
+        return function(by_row, [None if x is None else x[0] for x in occupied])
 
     def one(_: None, row: tuple[Any, list[Present]]) -> tuple[None, Any]:
         own, present = row

@@ -3,16 +3,19 @@
 Each producer reads an `Atmosphere` and a `Band` and returns `OpticalProperties` with layers from
 the top: `rayleigh` for air, `gas_absorption` for its gases, `aerosol` for one plume, `background`
 for the aerosol beside plumes, `liquid_cloud` for droplets, `hydrometeor` for a class of any other
-particles. They are added with ``+``; `column_optics` adds them all. `smoke` and `ash` make plumes
-with published optics, every number of which can be replaced, `mie_plume` one whose optics follow
-from the size of its particles. The functions read as of one column, and a batch of
-columns has its axes behind those of every array; they know neither streams nor surface.
+particles. They are added with ``+``; `column_optics` adds them all, and `mixture` is what a solver
+reads of them. `smoke` and `ash` make plumes with published optics, every number of which can be
+replaced, `mie_plume` one whose optics follow from the size of its particles. The functions read as
+of one column, and a batch of columns has its axes behind those of every array; they know neither
+streams nor surface.
 """
 
 from .aerosol import aerosol as aerosol
 from .aerosol import background as background
 from .cloud import liquid_cloud as liquid_cloud
+from .column import Mixture as Mixture
 from .column import column_optics as column_optics
+from .column import mixture as mixture
 from .droplets import effective_radius as effective_radius
 from .gamma import Habit as Habit
 from .gas import ALL_GASES as ALL_GASES

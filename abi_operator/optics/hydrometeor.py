@@ -268,7 +268,9 @@ def _of_radius(
         asymmetry = rough_ice.rough_ice_geometric_asymmetry(radius_um, band)
     else:
         fixed = RIMED_GEOMETRIC if optics.asymmetry == "rimed" else ROUGHENED_GEOMETRIC
-        asymmetry = jnp.full_like(radius, fixed)
+        # Of every band that has a radius of its own: JAX takes no result for several bands of which
+        # the slopes are of each.
+        asymmetry = fixed + 0 * radius
     share = diffracted_share(1 - absorption / extinction)
     lobe = diffraction_asymmetry(radius_um, wavelength_um)
     return _Seen(extinction, absorption, asymmetry, share, lobe)

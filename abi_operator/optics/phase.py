@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..optical_properties import PhaseFunction, trailing
+from ..machine.algebra import trailing
+from ..optical_properties import PhaseFunction
 from .pointwise import choose, pointwise
 
 _BLOCK = 16  # powers that are products of x^1, x^2, x^4 and x^8

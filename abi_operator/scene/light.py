@@ -34,10 +34,11 @@ class Unheard(NamedTuple):
     listener: Listener
 
     def compiling(self, begins: bool) -> None:
+        """Pass on that a program begins, or has ended, to be compiled."""
         self.listener.compiling(begins)
 
     def solved(self, columns: int) -> None:
-        pass
+        """Say nothing: these columns are counted elsewhere."""
 
 
 def light(

@@ -111,7 +111,9 @@ def scatter(title: str, x: np.ndarray, y: np.ndarray, high: float, axes: str) ->
     title, axes
         What it is of, and what the axes are.
     x, y
-        Pairs; both axes run from 0 to `high`, those beyond are not shown.
+        Pairs.
+    high
+        Where both axes, which begin at 0, end; pairs beyond are not shown.
     """
     count = np.histogram2d(y, x, 96, ((0, high), (0, high)))[0]
     shade = np.log1p(count) / max(float(np.log1p(count.max())), 1e-9)

@@ -74,6 +74,7 @@ class Problem:
         emission: Emission,
         planck_jumps: Float[Array, "layer *batch"] | None,
     ) -> tuple[Top, Emission]:
+        """Mode 0 of all layers over a ground, with what both emit (`azimuth.emitting_mean`)."""
         shared = self.shared()
         return emitting_mean(*shared, ground, emission, self.one, planck_jumps, **self.how())
 
@@ -90,13 +91,16 @@ class Problem:
         return twice_reflected((sunlit, known), options)
 
     def higher(self, grounds: Bordered | None) -> Float[Array, "view *batch"]:
+        """Sum over the modes above 0, by `azimuth.higher_modes`."""
         azimuth = self.column.relative_azimuth
         return higher_modes(*self.shared(), grounds, azimuth, **self.how())
 
     def shared(self) -> tuple[ScaledLayers, LegendreTables, Directions]:
+        """First arguments of the functions of `azimuth`."""
         return self.layers, self.tables, self.directions
 
     def how(self) -> dict[str, Any]:
+        """Their last ones, by name."""
         return {"doublings": self.doublings, "single_scattering": not self.options.tms}
 
 

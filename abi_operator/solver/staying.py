@@ -94,6 +94,7 @@ class Kept(NamedTuple):
     num_above: int
 
     def __call__(self, tile: Column, options: Options) -> Float[Array, "number batch"]:
+        """Numbers that are kept of each column, in one row each."""
         num_above, num_layers = self.num_above, tile.tau.shape[0]
         upper = lower = None
         if num_above > 0:

@@ -16,9 +16,13 @@ _NUM_COSINES, _NUM_AZIMUTHS = 64, 37
 class Ground(Protocol):
     """Any ground of this room."""
 
-    def brdf(self, mu_out: Array, mu_in: Array, relative_azimuth: Array, /) -> Array: ...
+    def brdf(self, mu_out: Array, mu_in: Array, relative_azimuth: Array, /) -> Array:
+        """Reflectance factor between two directions; see `solver.Surface`."""
+        ...
 
-    def modes(self, m: int | Int[Array, ""], mu_out: Array, mu_in: Array, /) -> Array: ...
+    def modes(self, m: int | Int[Array, ""], mu_out: Array, mu_in: Array, /) -> Array:
+        """Its azimuth mode m."""
+        ...
 
 
 class Report(NamedTuple):

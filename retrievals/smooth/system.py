@@ -62,6 +62,7 @@ def system(
 
 
 def solved(matrix: Product, inverse_blocks: Array, right: Float[Array, "pixel x"]) -> Array:
+    """A^-1 times a vector, by conjugate gradients from the inverses of A's diagonal blocks."""
     shape = jax.ShapeDtypeStruct(right.shape, right.dtype)
     tag = lx.positive_semidefinite_tag
     operator = lx.FunctionLinearOperator(matrix, shape, tag)

@@ -13,7 +13,6 @@ from states import column, stacked
 
 import abi_operator
 from abi_operator import BANDS, GRASSO2013, band_columns, brf, reflectance_factor
-from abi_operator.optical_properties import OpticalProperties
 from abi_operator.reflectance import with_the_suns_cosine
 from abi_operator.solver import on_double_gauss
 
@@ -147,7 +146,7 @@ def test_batches_equal_single_columns():
 
 def test_exponential_terms_are_weighted_runs(monkeypatch):
     """A band of two gas terms is the weighted sum of two grey bands."""
-    plain = band_columns.column_optics
+    plain = band_columns.mixture
     # Two columns that differ in what the functions below read their gas from, and in no optics,
     # for there is no ash.
     grey = np.array([0.01, 0.3])
@@ -155,12 +154,12 @@ def test_exponential_terms_are_weighted_runs(monkeypatch):
     pair = eqx.tree_at(lambda s: s.atmosphere.plumes["ash"].brightness, pair, grey)
 
     def run(depths_of, weights):
-        def optics(atmosphere, band, gases):
-            layers = jnp.ones_like(atmosphere.height[1:])
-            gas = depths_of(atmosphere)[:, None] * layers
-            return plain(atmosphere, band, gases) + OpticalProperties(gas, jnp.asarray(weights), ())
+        def optics(atmosphere, *how):
+            air = plain(atmosphere, *how)
+            tau = air.tau + depths_of(atmosphere)[:, None] * jnp.ones_like(atmosphere.height[1:])
+            return air._replace(tau=tau, ssa=air.ssa * air.tau / tau, weight=jnp.asarray(weights))
 
-        monkeypatch.setattr(band_columns, "column_optics", optics)
+        monkeypatch.setattr(band_columns, "mixture", optics)
         monkeypatch.setattr(band_columns, "num_terms", lambda *_: len(weights))
         programs_anew(monkeypatch)
         return brf(pair, ("C01",), num_streams=2, num_modes=1, num_doublings=0)

@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from ..._numerics import safe_divide
 from ...atmosphere import Atmosphere, Gases
 from ...constants import STANDARD_PRESSURE
-from ...optical_properties import trailing
+from ...machine.algebra import trailing
 from ..air import counted_pressure
 from ..pointwise import choose, pointwise
 
@@ -77,6 +77,7 @@ class MixedGas(NamedTuple):
     exponent: float | Array
 
     def __call__(self, atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
+        """Amount in each layer of one column."""
         return amounts_of(atmosphere, [self])[0]
 
     def of_path(self, atmosphere: Atmosphere, path: Float[Array, "layer *batch"]) -> Array:
@@ -101,6 +102,7 @@ class ScaledVapour(NamedTuple):
     exponent: float | Array
 
     def __call__(self, atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
+        """Amount in each layer of one column."""
         return amounts_of(atmosphere, [self])[0]
 
     def of_path(self, atmosphere: Atmosphere, path: Float[Array, "layer *batch"]) -> Array:
@@ -131,6 +133,7 @@ class WarmVapour(NamedTuple):
     quadratic: float | Array
 
     def __call__(self, atmosphere: Atmosphere) -> Float[Array, "layer *batch"]:
+        """Amount in each layer of one column."""
         return amounts_of(atmosphere, [self])[0]
 
     def of_path(self, atmosphere: Atmosphere, path: Float[Array, "layer *batch"]) -> Array:

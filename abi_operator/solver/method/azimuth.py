@@ -1,6 +1,7 @@
 """The azimuth modes of the multiple scattering, one stack each."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -62,23 +63,47 @@ def legendre_tables(
 ) -> LegendreTables:
     """Evaluate the functions of all modes at the nodes, and at the beams over their cosines."""
     at_nodes = node_functions(num_streams, num_modes)
-    of_parity = [
-        [(m, slice((m + parity) % 2, None, 2)) for m in range(num_modes)] for parity in (0, 1)
-    ]
-
-    def at_beams(cosines: Array) -> tuple[Array, ...]:
-        found = associated_legendre(num_modes, num_streams, cosines) / cosines
-        return tuple(
-            jnp.swapaxes(jnp.stack([found[m, d] for m, d in rows]), 1, 2) for rows in of_parity
-        )
-
     even, odd = (
         jnp.stack([jnp.asarray(at_nodes[m, d].T, cosines.dtype) for m, d in rows])
-        for rows in of_parity
+        for rows in _rows_of_parities(num_modes)
     )
+    return LegendreTables((even, odd), _at_beams(num_streams, num_modes, cosines))
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _at_beams(num_streams: int, num_modes: int, cosines: Array) -> tuple[Array, ...]:
+    """Functions of both parities over the cosines, with slopes beside the values in derivatives:
+    backwards that is one sum, and no second loop over the degrees."""
     # A loop over degrees of which each kernel takes less than its start.
-    beams = one_kernel(at_beams, 1, num_beams=len(cosines))(cosines)
-    return LegendreTables((even, odd), beams)
+    return one_kernel(_over_cosines(num_streams, num_modes), 1, num_beams=len(cosines))(cosines)
+
+
+@_at_beams.defjvp
+def _(num_streams: int, num_modes: int, primals: Any, tangents: Any) -> Any:
+    (cosines,), (change,) = primals, tangents
+
+    def with_slopes(cosines: Array) -> tuple[Any, Any]:
+        of = _over_cosines(num_streams, num_modes)
+        return jax.jvp(of, (cosines,), (jnp.ones_like(cosines),))
+
+    found, slopes = one_kernel(with_slopes, 1, num_beams=len(cosines))(cosines)
+    return found, tuple(x * change[None, :, None] for x in slopes)
+
+
+def _over_cosines(num_streams: int, num_modes: int) -> Callable[[Array], tuple[Array, ...]]:
+    def at(cosines: Array) -> tuple[Array, ...]:
+        found = associated_legendre(num_modes, num_streams, cosines) / cosines
+        return tuple(
+            jnp.swapaxes(jnp.stack([found[m, d] for m, d in rows]), 1, 2)
+            for rows in _rows_of_parities(num_modes)
+        )
+
+    return at
+
+
+def _rows_of_parities(num_modes: int) -> list[list[tuple[int, slice]]]:
+    """Of each mode, the degrees of even l + m, then those of odd."""
+    return [[(m, slice((m + p) % 2, None, 2)) for m in range(num_modes)] for p in (0, 1)]
 
 
 def weighted_moments(layers: ScaledLayers) -> Float[Array, "parity layer degree *batch"]:

@@ -15,9 +15,13 @@ from ...lambertian import Lambertian as Lambertian
 class AnySurface(Protocol):
     """What the solver asks of a ground: the two methods of a `Surface`, subclass or not."""
 
-    def brdf(self, mu_out: Any, mu_in: Any, relative_azimuth: Any) -> Any: ...
+    def brdf(self, mu_out: Any, mu_in: Any, relative_azimuth: Any) -> Any:
+        """Reflectance factor between two directions, as `Surface.brdf` has it."""
+        ...
 
-    def modes(self, m: Any, mu_out: Any, mu_in: Any) -> Any: ...
+    def modes(self, m: Any, mu_out: Any, mu_in: Any) -> Any:
+        """Its azimuth mode m, as `Surface.modes` has it."""
+        ...
 
 
 class Surface(eqx.Module):

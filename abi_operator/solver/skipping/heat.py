@@ -143,8 +143,14 @@ def lost(
 
     Parameters
     ----------
+    warm
+        What the columns emit, and how much of what goes down comes back up.
+    groups
+        Which layers are merged.
     members, solved
         Optical depth, 1 - ssa and increase of the Planck function of layers, and of groups.
+    secant, num_streams
+        As of `unscattered`.
     """
     tau, coalbedo, jumps = members
     apart = unscattered(tau, coalbedo, warm.planck[:-1], jumps, secant, num_streams)

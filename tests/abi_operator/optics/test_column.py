@@ -12,7 +12,7 @@ from jax.flatten_util import ravel_pytree
 from abi_operator.atmosphere import Hydrometeor
 from abi_operator.bands import BANDS
 from abi_operator.constants import STANDARD_PRESSURE
-from abi_operator.optics import aerosol, column_optics, liquid_cloud, rayleigh
+from abi_operator.optics import aerosol, column_optics, liquid_cloud, mixture, rayleigh
 from abi_operator.optics.rayleigh import STANDARD_DEPTH
 
 FLOAT32 = 3e-6
@@ -44,6 +44,43 @@ def test_column_is_the_sum_of_its_parts(make_atmosphere):
     )
     assert len(optics.scatterers) == 4
     assert optics.weight.shape == (1,)
+
+
+def test_a_mixture_is_its_column_evaluated(make_atmosphere):
+    """Values, and slopes in both modes, of classes that are in some layers, in one and in none."""
+    atmosphere = make_atmosphere()
+    mass = np.zeros(atmosphere.height.size - 1)
+    some, one = mass.copy(), mass.copy()
+    some[1:3], one[-1] = 1e-2, 2e-3
+    particles = {"ice": (some, 1e10), "graupel": (one, 1e6), "rain": (one, 1e5), "snow": (mass, 1)}
+    classes = {
+        name: Hydrometeor(jnp.asarray(x), n * jnp.asarray(x)) for name, (x, n) in particles.items()
+    }
+    atmosphere = dataclasses.replace(atmosphere, hydrometeors=classes)
+    flat, structure = ravel_pytree(atmosphere)
+    angle = jnp.asarray(0.9)
+
+    def evaluated(x):
+        found = mixture(structure(x), BANDS["C06"], (), 5, angle)
+        return ravel_pytree(found)[0]
+
+    def by_parts(x):
+        optics = column_optics(structure(x), BANDS["C06"], ())
+        parts = (
+            optics.tau,
+            optics.ssa,
+            optics.weight,
+            optics.moments(5),
+            optics.phase_function(angle),
+        )
+        return ravel_pytree(parts)[0]
+
+    np.testing.assert_allclose(evaluated(flat), by_parts(flat), rtol=1e-14)
+    for mode in (jax.jacrev, jax.jacfwd):
+        slopes, right = (jax.jit(mode(f))(flat) for f in (evaluated, by_parts))
+        # Beside the largest slope in the same number of the atmosphere: sums come in another order,
+        # and some cancel.
+        assert np.all(np.abs(slopes - right) <= 1e-10 * np.max(np.abs(right), axis=0))
 
 
 def test_no_plumes(make_atmosphere):
