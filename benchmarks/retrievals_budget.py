@@ -21,7 +21,7 @@ import numpy as np
 from retrievals_pixels import with_prior
 from rounds import Bars, table
 
-from abi_operator.machine.speed import use_compilation_cache, use_compiler_flags
+from abi_operator.machine.speed import use_compilation_cache
 from abi_operator.scene import ERROR_BUDGET
 from retrievals import Minimiser, retrieve_pixels
 from retrievals.chunks import map_chunks
@@ -44,7 +44,6 @@ def main():
     parser.add_argument("--streams", type=int, default=8)
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
-    use_compiler_flags()
     use_compilation_cache()
     jax.config.update("jax_enable_x64", True)
     whole, observation, states, prior, x = with_prior(options.pixels, options.streams, NAMES)

@@ -40,7 +40,7 @@ from retrievals_pixels import pixels_of_prior, rows, with_prior
 from workload import near_node
 
 from abi_operator.band_columns import columns_of_bands
-from abi_operator.machine.speed import usable_cores, use_compilation_cache, use_compiler_flags
+from abi_operator.machine.speed import usable_cores, use_compilation_cache
 from abi_operator.solver import on_double_gauss
 from retrievals import Minimiser, measurement, prepared, retrieve_pixels
 from retrievals.chunks import map_chunks
@@ -229,7 +229,6 @@ def main():
     parser.add_argument("--first", help="retrieve once what this file holds, and end")
     parser.add_argument("--check", action="store_true")
     given = parser.parse_args()
-    use_compiler_flags()
     use_compilation_cache()
     jax.config.update("jax_enable_x64", True)
     if given.first:

@@ -2,7 +2,7 @@
 
 import jax
 
-from abi_operator.machine import chunks, compiler, door
+from abi_operator.machine import chunks, door
 from abi_operator.machine.kept import Kept
 
 
@@ -15,7 +15,7 @@ def programs_anew(monkeypatch):
     def anew(of, leaves):  # another function, of which JAX has no trace
         return door._wanted(of, leaves)
 
-    program = Kept(anew, compiler.options())
+    program = Kept(anew, recorded=True)
     monkeypatch.setattr(door, "_inside", jax.jit(anew, static_argnums=0))
     monkeypatch.setattr(door, "_alone", lambda: program)
     monkeypatch.setattr(chunks, "_compiled", set())

@@ -44,9 +44,9 @@ SOON_COMPILED: dict[str, int | bool] = {_LEVEL: 0}
 without optimisation, in half the time. What that does to results is rounding."""
 
 
-def options() -> dict[str, int | bool | str]:
-    """Options of `jax.jit`."""
-    found: dict[str, int | bool | str] = dict(_RECORDED)
+def options(recorded: bool = True) -> dict[str, int | bool | str]:
+    """Options of `jax.jit`; `recorded`: a GPU follows loops and branches by itself."""
+    found: dict[str, int | bool | str] = dict(_RECORDED) if recorded else {}
     if on_cpu():
         found = {_EMITTERS: False}
         if _chosen_level() is None:

@@ -27,7 +27,6 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
-from . import compiler
 from .batching import announced, tile_by_tile
 from .checked import refuse_checked
 from .chunks import begin_chunks, can_be_cut, map_chunks
@@ -292,13 +291,5 @@ _inside = jax.jit(_wanted, static_argnums=0)
 
 @cache
 def _alone() -> Kept:
-    """The same, called with values, so that options of the compiler can be given.
-
-    JAX does not take these inside another `jax.jit`.
-    """
-    return Kept(_wanted_alone, compiler.options())
-
-
-def _wanted_alone(of: tuple[Program, Any], leaves: Leaves) -> Any:
-    with compiler.traced_for(compiler.options()):
-        return _wanted(of, leaves)
+    """The same, called with values, so that options of the compiler can be given."""
+    return Kept(_wanted, recorded=True)

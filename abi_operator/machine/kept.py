@@ -20,7 +20,7 @@ import pickle
 import sys
 import time
 from collections.abc import Callable, Hashable
-from functools import cache, partial
+from functools import cache, cached_property, partial, wraps
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from jax.experimental import serialize_executable
 from jax.tree_util import PyTreeDef
 
 from .._ending import unfinished
+from . import compiler
 from .plain import is_plain
 from .processor import processor_key
 
@@ -51,30 +52,46 @@ def use(folder: Path) -> None:
 class Kept:
     """A function compiled for what it is called with, by `jax.jit`, or read from the disk.
 
+    It is compiled as `compiler.options` say, and so called with values alone: inside another
+    `jax.jit` JAX takes no options.
+
     Parameters
     ----------
     function
         Of something to be compiled for, which is hashable, and of pytrees of arrays. Of a module's
         own, closing over nothing.
-    compiler_options
-        As of `jax.jit`.
+    recorded
+        Whether a GPU follows its loops and branches by itself, which has been tried with columns
+        alone, and not with minimisations.
     """
 
-    def __init__(
-        self, function: Callable[..., Any], compiler_options: dict[str, Any] | None = None
-    ) -> None:
-        self._function, self._options = function, compiler_options
-        self._jitted = jax.jit(function, static_argnums=0, compiler_options=compiler_options)
+    def __init__(self, function: Callable[..., Any], recorded: bool = False) -> None:
+        # Another function, of which JAX knows no trace that was made for other options.
+        self._function, self._alone = function, wraps(function)(lambda *x: function(*x))
+        self._recorded = recorded
         self._found: dict[Any, Callable[..., Any]] = {}
 
+    @cached_property
+    def _options(self) -> dict[str, int | bool | str]:
+        """Known when it is first called: they ask JAX for its device, which is not to be started
+        by an import."""
+        return compiler.options(self._recorded)
+
+    @cached_property
+    def _jitted(self) -> Any:
+        return jax.jit(self._alone, static_argnums=0, compiler_options=self._options)
+
     def __call__(self, fixed: Hashable, *arguments: Any) -> Any:
-        return self._program(fixed, arguments)(*arguments)
+        """What the function gives, compiled for `fixed` and for arrays of these shapes."""
+        with compiler.traced_for(self._options):
+            return self._program(fixed, arguments)(*arguments)
 
     def prepare(self, fixed: Hashable, *arguments: Any) -> None:
         """Compile or read what a call needs; `jax.jit` compiles in calling."""
-        program = self._program(fixed, arguments)
-        if _folder is None or is_plain():
-            program(*arguments)
+        with compiler.traced_for(self._options):
+            program = self._program(fixed, arguments)
+            if _folder is None or is_plain():
+                program(*arguments)
 
     def _program(self, fixed: Hashable, arguments: tuple[Any, ...]) -> Callable[..., Any]:
         if _folder is None or is_plain():
@@ -88,7 +105,7 @@ class Kept:
             if name is None:
                 self._found[key] = partial(self._jitted, fixed)
             else:
-                function, path = partial(self._function, fixed), _folder / name
+                function, path = partial(self._alone, fixed), _folder / name
                 program = _read(path) or _compiled(function, self._options, arguments, path)
                 self._found[key] = program
         return self._found[key]
