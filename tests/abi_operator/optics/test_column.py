@@ -10,7 +10,7 @@ import pytest
 from jax.flatten_util import ravel_pytree
 
 from abi_operator.atmosphere import Hydrometeor
-from abi_operator.bands import BANDS
+from abi_operator.bands import BANDS, several_bands
 from abi_operator.constants import STANDARD_PRESSURE
 from abi_operator.optics import aerosol, column_optics, liquid_cloud, mixture, rayleigh
 from abi_operator.optics.rayleigh import STANDARD_DEPTH
@@ -49,38 +49,55 @@ def test_column_is_the_sum_of_its_parts(make_atmosphere):
 def test_a_mixture_is_its_column_evaluated(make_atmosphere):
     """Values, and slopes in both modes, of classes that are in some layers, in one and in none."""
     atmosphere = make_atmosphere()
-    mass = np.zeros(atmosphere.height.size - 1)
-    some, one = mass.copy(), mass.copy()
-    some[1:3], one[-1] = 1e-2, 2e-3
-    particles = {"ice": (some, 1e10), "graupel": (one, 1e6), "rain": (one, 1e5), "snow": (mass, 1)}
-    classes = {
-        name: Hydrometeor(jnp.asarray(x), n * jnp.asarray(x)) for name, (x, n) in particles.items()
-    }
+    mass = np.zeros((3, atmosphere.height.size - 1))
+    mass[0, 1:3], mass[1, -1] = 1e-2, 2e-3
+    particles = zip(("ice", "rain", "snow"), jnp.asarray(mass), (1e10, 1e5, 1e5), strict=True)
+    classes = {name: Hydrometeor(x, n * x) for name, x, n in particles}
     atmosphere = dataclasses.replace(atmosphere, hydrometeors=classes)
     flat, structure = ravel_pytree(atmosphere)
-    angle = jnp.asarray(0.9)
+    band, angle = BANDS["C06"], jnp.asarray(0.9)
 
     def evaluated(x):
-        found = mixture(structure(x), BANDS["C06"], (), 5, angle)
-        return ravel_pytree(found)[0]
+        return ravel_pytree(mixture(structure(x), band, (), 5, angle))[0]
 
     def by_parts(x):
-        optics = column_optics(structure(x), BANDS["C06"], ())
-        parts = (
-            optics.tau,
-            optics.ssa,
-            optics.weight,
-            optics.moments(5),
-            optics.phase_function(angle),
-        )
-        return ravel_pytree(parts)[0]
+        optics = column_optics(structure(x), band, ())
+        parts = optics.tau, optics.ssa, optics.weight, optics.moments(5)
+        return ravel_pytree((*parts, optics.phase_function(angle)))[0]
 
-    np.testing.assert_allclose(evaluated(flat), by_parts(flat), rtol=1e-14)
-    for mode in (jax.jacrev, jax.jacfwd):
-        slopes, right = (jax.jit(mode(f))(flat) for f in (evaluated, by_parts))
-        # Beside the largest slope in the same number of the atmosphere: sums come in another order,
-        # and some cancel.
-        assert np.all(np.abs(slopes - right) <= 1e-10 * np.max(np.abs(right), axis=0))
+    @functools.partial(jax.jit, static_argnums=0)
+    def all_of_it(function, x, weight, change):
+        value, pull_back = jax.vjp(function, x)
+        return value, pull_back(weight)[0], jax.jvp(function, (x,), (change,))[1]
+
+    rng = np.random.default_rng(0)
+    weight = rng.uniform(0.5, 1.5, by_parts(flat).shape)
+    change = 1e-3 * np.asarray(flat) * rng.uniform(0.5, 1.5, flat.shape)
+    found, right = (all_of_it(f, flat, weight, change) for f in (evaluated, by_parts))
+    for x, y in zip(found, right, strict=True):
+        np.testing.assert_allclose(x, y, rtol=1e-11, atol=1e-14)
+
+
+def test_slopes_of_each_of_several_bands(make_atmosphere):
+    """Of graupel, whose asymmetry is one number, and which each band has a copy of."""
+    names, angle = ("C01", "C06"), jnp.asarray(0.9)
+    mass = jnp.zeros(make_atmosphere().height.size - 1).at[1].set(1e-2)
+    graupel = {"graupel": Hydrometeor(mass, 1e7 * mass)}
+    atmosphere = dataclasses.replace(make_atmosphere(plumes={}), hydrometeors=graupel)
+
+    def summed(atmosphere, band):
+        found = mixture(atmosphere, band, (), 5, angle)
+        return jnp.sum(found.moments) + jnp.sum(found.phase_function) + jnp.sum(found.tau)
+
+    def of_all(copies):
+        return jnp.sum(jax.vmap(summed)(copies, several_bands(names, angle.dtype)))
+
+    copies = jax.tree.map(lambda x: jnp.broadcast_to(x, (len(names), *x.shape)), atmosphere)
+    found = jax.grad(of_all)(copies)
+    for k, name in enumerate(names):
+        own = jax.grad(summed)(atmosphere, BANDS[name])
+        for x, y in zip(jax.tree.leaves(found), jax.tree.leaves(own), strict=True):
+            np.testing.assert_allclose(x[k], y, rtol=1e-11, atol=1e-14)
 
 
 def test_no_plumes(make_atmosphere):
