@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from jax_settings import settings
 
-from abi_operator.machine import door, kept, speed
+from abi_operator.machine import compiler, door, kept, speed
 from abi_operator.machine.door import _wanted
 from abi_operator.solver import toa_brf
 
@@ -140,6 +140,23 @@ def test_without_a_folder_it_is_a_jit(no_folder):
     assert program._jitted._cache_size() == 1
     np.testing.assert_array_equal(program(2, jnp.arange(3.0))[0], [0, 2, 4])
     assert program._jitted._cache_size() == 1
+
+
+def test_it_is_traced_and_compiled_with_the_compilers_options(no_folder, monkeypatch):
+    """For short loops where they ask for the first level; and what XLA does not know is refused."""
+    seen = []
+
+    def anew(count, x):
+        seen.append(compiler.shortest_loop())
+        return count * x
+
+    monkeypatch.setattr(compiler, "_chosen_level", lambda: None)
+    monkeypatch.setattr(compiler, "options", lambda recorded: {compiler._LEVEL: 1})
+    np.testing.assert_array_equal(kept.Kept(anew)(2, jnp.arange(3.0)), [0, 2, 4])
+    assert seen == [compiler.SHORTEST] and compiler.shortest_loop() == 2 * compiler.SHORTEST
+    monkeypatch.setattr(compiler, "options", lambda recorded: {"xla_no_such_option": recorded})
+    with pytest.raises(jax.errors.JaxRuntimeError, match="xla_no_such_option"):
+        kept.Kept(anew)(2, jnp.arange(3.0))
 
 
 def test_a_function_of_no_package_is_a_jit_as_well(monkeypatch, tmp_path):
