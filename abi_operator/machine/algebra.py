@@ -207,33 +207,6 @@ def weighted(terms: Sequence[tuple[Array | float, Array]]) -> Array:
     return total
 
 
-def weighted_rows(weights: Sequence[float | Float[Array, "..."]], arrays: Sequence[Array]) -> Array:
-    """Weighted sum of arrays ``... col *batch`` as a kernel of its own, in long rows.
-
-    A loop over 32 columns with as little in it as this LLVM unrolls, number by number, before it
-    could make vectors of it; not so where all that lies in a row is one axis.
-    """
-    shape = arrays[0].shape
-    batches = [jnp.ndim(w) for w in weights if not isinstance(w, float)]
-    if not batches:
-        return _weighted(weights, [x.reshape(-1) for x in arrays]).reshape(shape)
-    col = len(shape) - max(batches) - 1
-    rows = [x.reshape(*shape[:col], -1) for x in arrays]
-    along = [w if isinstance(w, float) else _along(w, shape[col]) for w in weights]
-    return _weighted(along, rows).reshape(shape)
-
-
-def _along(weight, count):
-    if count == 1:
-        return weight.reshape(-1)
-    return fenced(lambda w: jnp.broadcast_to(w, (count, *w.shape)).reshape(-1))(weight)
-
-
-@fenced
-def _weighted(weights, arrays):
-    return weighted(list(zip(weights, arrays, strict=True)))
-
-
 def total(terms: Any) -> Array:
     """Sum over the first axis, inside a kernel, which a reduction would cut in two."""
     result = terms[0]

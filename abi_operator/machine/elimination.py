@@ -66,7 +66,8 @@ def _inverse_of_one_or_two(a):
     if a.shape[0] == 1:
         return 1 / a
     p, q, r = a[:1, :1], a[:1, 1:], a[1:, 1:]
-    reciprocal = 1 / (p * r - q * q)
+    # Both corners are read: with less to do LLVM would unroll a loop over 16 columns as scalars.
+    reciprocal = 1 / (p * r - q * a[1:, :1])
     upper, lower = (jnp.concatenate(row, axis=1) for row in ((r, -q), (-q, p)))
     return jnp.concatenate([upper, lower]) * reciprocal
 

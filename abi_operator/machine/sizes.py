@@ -25,7 +25,8 @@ leave it idle."""
 # Of few rows, or in single precision, a layer of so many columns is in the cache; of more streams
 # one of as few as there are vectors of, or of half as many. Within an error budget columns are put
 # in order: those of a narrower tile are more alike, which from 14 streams on is worth more.
-_TILE, _FEW_STREAMS, _FEW_STREAMS_IN_ORDER, _MORE_STREAMS = 64, 6, 12, 16
+_TILE, _FEW_STREAMS, _FEW_STREAMS_IN_ORDER, _MORE_STREAMS = 64, 6, 12, 14
+_WHOLE_STREAMS = 16  # up to which a chunk has as many columns
 
 # What another device than a CPU takes, of whatever is taken together, and of the solver's columns
 # up to 8 and up to 16 streams. A GPU needs half the time a column for 16,384 that it needs for
@@ -46,8 +47,8 @@ def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
     `rounds` tells whether they are solved within a budget, most of it in float32.
 
     The fewer, the more of a layer is in the cache next to the processor, but of too few LLVM makes
-    no vectors (`compiler.shortest_loop`; `algebra.weighted_rows` has what was done about it). Where
-    a layer is one kernel (`kernels`) a tile is also small enough for that.
+    no vectors (`compiler.shortest_loop`; `rows.in_rows` has what was done about it). Where a
+    layer is one kernel (`kernels`) a tile is also small enough for that.
     """
     if not on_cpu():
         fitting = [tile for most, tile in _SOLVER_ELSEWHERE.items() if num_streams <= most]
@@ -75,7 +76,7 @@ def tile_of_states(columns: int, num_streams: int, dtype: Any) -> int:
 def _whole(num_streams: int, dtype: Any, rounds: bool = False) -> int:
     """Columns of which those that are taken together are a multiple, on a CPU."""
     single = rounds or jnp.dtype(dtype) == jnp.float32
-    return _TILE if single or num_streams <= _MORE_STREAMS else _TILE // 2
+    return _TILE if single or num_streams <= _WHOLE_STREAMS else _TILE // 2
 
 
 def tile_of_grounds() -> int:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from jaxtyping import Array, Float
 
-from ...machine.algebra import fenced
+from ...machine.rows import in_rows
 from ..method.bordered import combined, reciprocal
 from .fields import Feed
 
@@ -31,12 +31,12 @@ class Beams(NamedTuple):
 def own_beams(a, p, h, d) -> Beams:
     """As on the way up."""
     square = h * h
-    over_v = reciprocal(_inner_middle(p, a, d * square))
-    fraction, ratio_v = _fraction(a, over_v, square / 9)
-    z = _sum(p, square, fraction)
+    over_v = reciprocal(_inner_middle(d * square, p, a))
+    fraction, ratio_v = _fraction(square / 9, a, over_v)
+    z = _sum(square, p, fraction)
     over_u = reciprocal(z)
-    ratio_u, ratio_w = _times(over_u, a, fraction)
-    y = _less(h, a, h * square, a, ratio_w)
+    ratio_u, ratio_w = _times((), over_u, a, fraction)
+    y = _less((h, h * square), a, a, ratio_w)
     return Beams(ratio_v, ratio_u, ratio_w, over_v, over_u, y, z)
 
 
@@ -53,33 +53,34 @@ def next_step(step: Step, y_feed: Feed) -> tuple[Step, Array, Array]:
     """After a doubling; and the ratio, and 1 over the middle, of its quotient."""
     y, z, z_feed, h = step
     z_feed = combined([1.0, h], [z_feed, y_feed])
-    z = _sum(z, h, y)
+    z = _sum(h, z, y)
     over = reciprocal(z)
-    (ratio,) = _times(over, y)
-    return Step(_less(2.0, y, 2 * h, y, ratio), z, z_feed, 2 * h), ratio, over
+    (ratio,) = _times((), over, y)
+    return Step(_less((2.0, 2 * h), y, y, ratio), z, z_feed, 2 * h), ratio, over
 
 
-@fenced
-def _inner_middle(p, a, weight):
+@in_rows
+def _inner_middle(weight, p, a):
     return 5.0 * p + weight * a
 
 
-@fenced
-def _fraction(a, over, ninth):
+@in_rows
+def _fraction(ninth, a, over):
     ratio = a * over
     return a / 3 - ninth * (a * ratio), ratio
 
 
-@fenced
-def _sum(x, weight, y):
+@in_rows
+def _sum(weight, x, y):
     return x + weight * y
 
 
-@fenced
-def _times(over, *rights):
-    return [x * over for x in rights]
+@in_rows
+def _times(_, over, *rights):
+    return tuple(x * over for x in rights)
 
 
-@fenced
-def _less(weight, x, factor, y, ratio):
-    return weight * x - factor * (y * ratio)
+@in_rows
+def _less(weights, x, y, ratio):
+    of_x, of_y = weights
+    return of_x * x - of_y * (y * ratio)

@@ -22,6 +22,7 @@ from typing import NamedTuple
 from jaxtyping import Array, Float
 
 from ...machine.algebra import comes_in_parts, fenced, product, product_alone, total, transpose
+from ...machine.rows import in_rows
 from ..method.bordered import Bordered, combined
 
 
@@ -111,21 +112,29 @@ def swapped(border):
     return border[:, ::-1]
 
 
-@fenced
 def advance(
     fields: Fields, drop: Fields, h: float | Float[Array, "*batch"], jump: Fields | None = None
 ) -> Fields:
     """``fields - h drop - jump``."""
-    moved = Fields(*(x - h * y for x, y in zip(fields, drop, strict=True)))
     if jump is None:
-        return moved
-    return Fields(*(x - y for x, y in zip(moved, jump, strict=True)))
+        return _less_times(h, fields, drop)
+    return _less_times_and(h, fields, drop, jump)
 
 
-@fenced
-def scaled(factor: float | Float[Array, "*batch"], fields: Fields) -> Fields:
-    """``factor fields``."""
-    return Fields(*(factor * x for x in fields))
+@in_rows
+def _less_times(h, x, y):
+    return x - h * y
+
+
+@in_rows
+def _less_times_and(h, x, y, z):
+    return x - h * y - z
+
+
+@in_rows
+def scaled(factor, x):
+    """``factor x``, of fields."""
+    return factor * x
 
 
 def pair(

@@ -37,9 +37,10 @@ from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, matmul, total
 from ...machine.kernels import one_kernel
+from ...machine.rows import are_few
 from ..method.adding import top
 from ..method.around import Above
-from ..method.bordered import Bordered, Vector
+from ..method.bordered import Bordered, Vector, combined
 from ..method.doublings import Doublings
 from ..method.layer import ModeKernels
 from ..method.mode_layers import Layer, Layers, Order, added_to, read
@@ -219,12 +220,20 @@ def _fields_at_the_top(stack: Bordered, weight, above: Above | None = None):
     return reflection, Fields(-scale * solved, scale, jnp.zeros_like(scale))
 
 
-@fenced
 def _collected(step, tau, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
     """Totals over the layers, and the layer's own slopes, from those over h."""
+    beams = None
+    if are_few(tau):
+        beams = combined([1.0, tau * step], [totals[:2], (a.beams, b.beams)])
+    return _collected_rest(step, tau, beams, totals, a, b, coalbedo)
+
+
+@fenced
+def _collected_rest(step, tau, beams, totals, a: MatrixSlopes, b: MatrixSlopes, coalbedo):
     h = tau * step
+    if beams is None:
+        beams = totals[0] + h * a.beams, totals[1] + h * b.beams
     secants = h * (a.secants + b.secants)
-    beams = totals[0] + h * a.beams, totals[1] + h * b.beams
     slopes = Layer(step * (a.h + b.h), h * coalbedo, secants[0], h * a.moments, h * b.moments)
     square = totals[3] + total(slopes.even**2) + total(slopes.odd**2)
     return (*beams, totals[2] + secants[1], square), slopes

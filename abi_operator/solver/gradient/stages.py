@@ -5,9 +5,12 @@ Y_e they are P, of the impedance hQ with the half thickness h of that stage, and
 is thermal light (`thermal`); of A and B^-1 they are `mode`'s over h. Nothing is ever divided by h.
 """
 
+from collections.abc import Callable
+
 from jaxtyping import Array, Float
 
 from ...machine.algebra import fenced, product, product_alone, transpose
+from ...machine.rows import are_few, in_rows
 from ..method.bordered import Bordered
 from .fields import (
     Action,
@@ -21,6 +24,53 @@ from .fields import (
     swapped,
     symmetric,
 )
+
+
+def _edgewise(
+    of_beams: Callable[..., tuple[Array, Array]], of_corner: Callable[..., tuple[Array, Array]]
+) -> Callable[..., tuple[Edge, Edge]]:
+    """A function of edges from what it does with entries of beams, and with the corner.
+
+    Parameters
+    ----------
+    of_beams
+        Maps numbers, ratios, and entries of a border or of a diagonal, of sides and of edges, to
+        such entries of two edges (`machine.rows.in_rows`).
+    of_corner
+        Maps numbers, ratios, and corners of edges.
+
+    Returns
+    -------
+    The function of numbers, ratios ``beam *batch``, sides (border and diagonal alone) and edges,
+    None among which stays None.
+    """
+    rows, corner_alone = in_rows(of_beams), fenced(of_corner)
+
+    def parted(x):
+        return None if x is None else tuple(x[:2])
+
+    def corners(edges):
+        return (None if x is None else x.corner for x in edges)
+
+    @fenced
+    def together(numbers, ratios, sides, edges):
+        own = [[x and x[k] for x in (*sides, *edges)] for k in range(2)]
+        beams = [of_beams(numbers, *ratios, *x) for x in own]
+        return _two_edges(beams, of_corner(numbers, *ratios, *corners(edges)))
+
+    def call(numbers, ratios, sides, edges):
+        if not are_few(ratios[0]):
+            return together(numbers, ratios, sides, edges)
+        twice = [(x, x) for x in ratios]
+        beams = rows(numbers, *twice, *map(tuple, sides), *map(parted, edges))
+        return _two_edges(beams, corner_alone(numbers, *ratios, *corners(edges)))
+
+    return call
+
+
+def _two_edges(beams, corner):
+    first, second = zip(*beams, corner, strict=True)
+    return Edge(*first), Edge(*second)
 
 
 def undouble(
@@ -37,9 +87,8 @@ def undouble(
     once = side(quotient, y_bar)
     z_core = _z_core(z_bar.core, once.core, once.border, quotient.border, quotient.core)
     y_core = _y_core(h, y_bar.core, once.core, z_core, more and more.core)
-    z_edge, y_edge = _undouble_edges(
-        h, quotient.ratio, once.border, once.diagonal, edge(y_bar), edge(z_bar), more and edge(more)
-    )
+    edges = edge(y_bar), edge(z_bar), more and edge(more)
+    z_edge, y_edge = _undouble_edges(h, [quotient.ratio], [once[1:]], edges)
     return Bordered(y_core, *y_edge), Bordered(z_core, *z_edge)
 
 
@@ -59,30 +108,18 @@ def _times_h(h, over_h, more):
     return h * over_h if more is None else h * over_h + more
 
 
-def _twice(ratio, border, diagonal, x: Edge):
-    """Edge with a quotient on both sides."""
-    return Edge(ratio * border, ratio * diagonal, ratio[:1] * ratio[1:] * x.corner)
+def _undouble_beams(h, ratio, once, y, z, more):
+    z = 2 * z + 2 * ratio * once
+    return z, 2 * y - 2 * h * (ratio * y + once) + h * _times_h(h, z, more)
 
 
-def _each(ratio, border, diagonal, x: Edge):
-    """Sum of the edges with a quotient on either side."""
-    return Edge(
-        ratio * x.border + border, ratio * x.diagonal + diagonal, (ratio[:1] + ratio[1:]) * x.corner
-    )
+def _undouble_corner(h, ratio, y, z, more):
+    sun, view = ratio[:1], ratio[1:]
+    z = 2 * z + 2 * sun * view * y
+    return z, 2 * y - 2 * h * (sun + view) * y + h * _times_h(h, z, more)
 
 
-@fenced
-def _undouble_edges(h, ratio, border, diagonal, y_bar, z_bar, more):
-    twice, each = (f(ratio, border, diagonal, y_bar) for f in (_twice, _each))
-    z = Edge(*(2 * q + 2 * t for q, t in zip(z_bar, twice, strict=True)))
-    whole = _edge_times_h(h, z, more)
-    y = Edge(*(2 * p - 2 * h * e + h * q for p, e, q in zip(y_bar, each, whole, strict=True)))
-    return z, y
-
-
-def _edge_times_h(h, over_h, more):
-    parts = zip(over_h, (None,) * 3 if more is None else more, strict=True)
-    return Edge(*(_times_h(h, x, y) for x, y in parts))
+_undouble_edges = _edgewise(_undouble_beams, _undouble_corner)
 
 
 def undo_start(
@@ -110,18 +147,16 @@ def undo_start(
     w = Side(w_core, w_border, w_diagonal)
     mixed = _both_sides(w.core, w.border, by_a.border, by_a.core)
     z_core = _start_z_core(h, z_bar.core, u.core, mixed, more and more.core)
-    z_edge, p_edge = _start_z_edge(
-        h, u[1:], w[1:], by_a.ratio, ratio_w, edge(y_bar), edge(z_bar), more and edge(more)
-    )
+    edges = edge(y_bar), edge(z_bar), more and edge(more)
+    z_edge, p_edge = _start_z_edges(h, [by_a.ratio, ratio_w], [u[1:], w[1:]], edges)
     z = Bordered(z_core, *z_edge)
     v = side(inner, z)
     twice = _both_sides(v.core, v.border, inner.border, inner.core)
     a_core, p_core = _start_cores(
         h, d, y_bar.core, w.core, z.core, v.core, twice, z_bar.core, mixed
     )
-    a_edge, p_edge = _start_edges(
-        h, d, edge(y_bar), w[1:], ratio_w, edge(z), v[1:], inner.ratio, p_edge
-    )
+    edges = edge(y_bar), edge(z), p_edge
+    a_edge, p_edge = _start_edges((h, d), [ratio_w, inner.ratio], [w[1:], v[1:]], edges)
     return Bordered(a_core, *a_edge), Bordered(p_core, *p_edge)
 
 
@@ -145,18 +180,17 @@ def _start_z_core(h, z_core, u, mixed, more):
     return _times_h(h, z_core + symmetric(h * h * mixed - u), more)
 
 
-@fenced
-def _start_z_edge(h, u, w, ratio_u, ratio_w, y_bar, z_bar, more):
-    border, diagonal = (0.5 * (x * ratio_w + y * ratio_u) for x, y in zip(u, w, strict=True))
-    mixed = Edge(
-        border,
-        diagonal,
-        0.5 * (ratio_u[1:] * ratio_w[:1] + ratio_w[1:] * ratio_u[:1]) * y_bar.corner,
-    )
-    each = _each(ratio_u, u[0], u[1], y_bar)
-    p = Edge(*(q + h * h * m for q, m in zip(z_bar, mixed, strict=True)))
-    z = Edge(*(x - 0.5 * e for x, e in zip(p, each, strict=True)))
-    return _edge_times_h(h, z, more), p
+def _start_z_beams(h, ratio_u, ratio_w, u, w, y, z, more):
+    p = z + 0.5 * h * h * (u * ratio_w + w * ratio_u)
+    return _times_h(h, p - 0.5 * (ratio_u * y + u), more), p
+
+
+def _start_z_corner(h, u, w, y, z, more):
+    p = z + 0.5 * h * h * (u[1:] * w[:1] + w[1:] * u[:1]) * y
+    return _times_h(h, p - 0.5 * (u[:1] + u[1:]) * y, more), p
+
+
+_start_z_edges = _edgewise(_start_z_beams, _start_z_corner)
 
 
 @fenced
@@ -167,14 +201,24 @@ def _start_cores(h, d, y, w, z, v, twice, z_bar, mixed):
     return a, z_bar + square * mixed + (5 / 9) * cubic * twice
 
 
-@fenced
-def _start_edges(h, d, y_bar, w, ratio_w, z, v, ratio_v, p_edge):
-    each_w, each_v = _each(ratio_w, w[0], w[1], y_bar), _each(ratio_v, v[0], v[1], z)
-    twice = _twice(ratio_v, v[0], v[1], z)
+def _start_beams(numbers, ratio_w, ratio_v, w, v, y, z, p):
+    h, d = numbers
     square = h * h
     cubic = square * h
-    a = (
-        y + h * (x / 3 - 0.5 * h * ew) - cubic / 9 * (ev - d * square * t)
-        for y, x, ew, ev, t in zip(y_bar, z, each_w, each_v, twice, strict=True)
-    )
-    return Edge(*a), Edge(*(p + (5 / 9) * cubic * t for p, t in zip(p_edge, twice, strict=True)))
+    twice = ratio_v * v
+    of_v = ratio_v * z + v - d * square * twice
+    a = y + h * (z / 3 - 0.5 * h * (ratio_w * y + w)) - cubic / 9 * of_v
+    return a, p + (5 / 9) * cubic * twice
+
+
+def _start_corner(numbers, ratio_w, ratio_v, y, z, p):
+    h, d = numbers
+    square = h * h
+    cubic = square * h
+    twice = ratio_v[:1] * ratio_v[1:] * z
+    of_v = (ratio_v[:1] + ratio_v[1:]) * z - d * square * twice
+    a = y + h * (z / 3 - 0.5 * h * (ratio_w[:1] + ratio_w[1:]) * y) - cubic / 9 * of_v
+    return a, p + (5 / 9) * cubic * twice
+
+
+_start_edges = _edgewise(_start_beams, _start_corner)

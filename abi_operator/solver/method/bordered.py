@@ -21,12 +21,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
-import jax
 from jaxtyping import Array, Float
 
-from ...machine.algebra import as_array, fenced, is_entry, matmul, total, weighted, weighted_rows
-from ...machine.compiler import shortest_loop
+from ...machine.algebra import fenced, matmul, total, weighted
 from ...machine.elimination import inverse
+from ...machine.rows import are_few, in_rows
 
 
 class Vector(eqx.Module):
@@ -113,37 +112,40 @@ class Bordered(eqx.Module):
         return Bordered(core, border, own, corner)
 
 
-@fenced
 def _edge_of_inverse(solved, between, own, corner):
-    return -solved * own, (between - corner) * own[0] * own[1:]
+    return _minus_times((), own, solved), _corner_of_inverse(between, own, corner)
+
+
+@in_rows
+def _minus_times(_, own, solved):
+    return -solved * own
+
+
+@fenced
+def _corner_of_inverse(between, own, corner):
+    return (between - corner) * own[0] * own[1:]
 
 
 def combined(weights: Sequence[float | Float[Array, "..."]], matrices: Sequence[Any]) -> Any:
-    """Weighted sum of matrices, or of trees with parts of them.
-
-    One kernel, or where there are few columns one in long rows for each array.
-    """
-    leaves = list(zip(*map(_leaves, matrices), strict=True))
-    if leaves[0][0].shape[-1] >= shortest_loop():
-        return _combined(weights, matrices)
-    sums = [weighted_rows(weights, [as_array(x) for x in arrays]) for arrays in leaves]
-    return jax.tree.unflatten(jax.tree.structure(matrices[0], is_leaf=is_entry), sums)
+    """Weighted sum of matrices, or of trees with parts of them."""
+    return _combined(list(weights), *matrices)
 
 
-def _leaves(matrix):
-    return jax.tree.leaves(matrix, is_leaf=is_entry)
-
-
-@fenced
-def _combined(weights, matrices):
-    return jax.tree.map(lambda *x: weighted(list(zip(weights, x, strict=True))), *matrices)
+@in_rows
+def _combined(weights, *entries):
+    return weighted(list(zip(weights, entries, strict=True)))
 
 
 def reciprocal(diagonal: Float[Array, "beam *batch"]) -> Float[Array, "beam *batch"]:
     """``1 / diagonal``; of two beams by one division, which takes as long as 16 products."""
-    if diagonal.shape[0] != 2:
-        return fenced(lambda x: 1 / x)(diagonal)
+    if diagonal.shape[0] != 2 or are_few(diagonal):
+        return _reciprocal((), diagonal)
     return _times_other(_one_over_both(diagonal), diagonal)
+
+
+@in_rows
+def _reciprocal(_, x):
+    return 1 / x
 
 
 @fenced

@@ -133,7 +133,7 @@ def _multiplied(x, y):
 
 
 def _source(border, middle, ratio):
-    """In rows of all beams, see `machine.algebra.weighted_rows`."""
+    """In rows of all beams, see `machine.rows.in_rows`."""
     rows = (x.reshape(len(x), -1) for x in (border, middle))
     return _less_passed(*rows, ratio.reshape(-1)).reshape(border.shape)
 
