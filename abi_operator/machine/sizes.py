@@ -96,14 +96,16 @@ def chunks_of_columns(
         tile = tile_size(num_streams, dtype, rounds)
         widths = _few_elsewhere(tile)
         return (*widths, _SORTED_TILES_ELSEWHERE * tile) if in_order else widths
-    tile, whole = _tile(num_streams, dtype, rounds, SHORTEST), _whole(num_streams, dtype, rounds)
+    # A chunk of fewer columns than these would be solved in few times what it needs to begin.
+    least = max(SHORTEST, _tile(num_streams, dtype, rounds, SHORTEST))
+    whole = _whole(num_streams, dtype, rounds)
     if in_order:
-        return VECTOR, tile, 8 * whole, _SORTED_TILES * whole
+        return VECTOR, least, 8 * whole, _SORTED_TILES * whole
     if num_streams > 8:
-        return VECTOR, tile, 8 * whole
+        return VECTOR, least, 8 * whole
     # A chunk is solved in few times what it needs to begin and to end.
-    between = (2 * whole,) if tile < whole else ()
-    return VECTOR, tile, *between, 8 * whole, 16 * whole
+    between = (2 * whole,) if least < whole else ()
+    return VECTOR, least, *between, 8 * whole, 16 * whole
 
 
 def chunks_of_states(tile: int) -> tuple[int, ...]:
