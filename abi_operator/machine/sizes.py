@@ -41,10 +41,12 @@ _SORTED_TILES = 32
 _SOLVER_TILES, _SOLVER_TILES_ELSEWHERE = 32, 2
 
 
-def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
+def tile_size(num_streams: int, dtype: Any, rounds: bool = False, alone: bool = False) -> int:
     """Columns that the solver takes at once, at most.
 
-    `rounds` tells whether they are solved within a budget, most of it in float32.
+    `rounds` tells whether they are solved within a budget, most of it in float32; `alone`, whether
+    these are slopes of the one layer that there is. That is no kernel, but a hundred, which take
+    as long to begin as the arithmetic of few columns.
 
     The fewer, the more of a layer is in the cache next to the processor, but of too few LLVM makes
     no vectors (`compiler.shortest_loop`; `rows.in_rows` has what was done about it). Where a
@@ -53,6 +55,8 @@ def tile_size(num_streams: int, dtype: Any, rounds: bool = False) -> int:
     if not on_cpu():
         fitting = [tile for most, tile in _SOLVER_ELSEWHERE.items() if num_streams <= most]
         return fitting[0] if fitting else _ELSEWHERE
+    if alone and num_streams <= _WHOLE_STREAMS:
+        return _TILE
     return _tile(num_streams, dtype, rounds, shortest_loop())
 
 

@@ -151,7 +151,8 @@ class _Program(NamedTuple):
 
     def tile(self, leaves: Leaves, what: Any) -> int:
         dtype = jnp.result_type(*leaves)
-        return tile_size(self.options.num_streams, dtype, self._rounds(what))
+        alone = what != "value" and leaves[0].shape[-1] == 1  # the optical depths' layers
+        return tile_size(self.options.num_streams, dtype, self._rounds(what), alone)
 
     def _rounds(self, what: Any) -> bool:
         """Whether most is solved in single precision: not slopes of what emits, or of layers

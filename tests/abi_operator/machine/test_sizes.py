@@ -45,6 +45,15 @@ def test_chunks_are_whole_tiles_and_rise(num_streams, dtype, backend, monkeypatc
             assert all(width % size == 0 for width in chunks[2:])
 
 
+@pytest.mark.parametrize("num_streams", [4, 8, 16, 32])
+def test_slopes_of_a_layer_alone_are_tiled_by_no_fewer(num_streams):
+    """And chunks are whole tiles of these as well."""
+    alone = sizes.tile_size(num_streams, np.float64, alone=True)
+    assert alone >= sizes.tile_size(num_streams, np.float64)
+    widths = sizes.chunks_of_columns(num_streams, np.float64)
+    assert all(width % alone == 0 or width < alone for width in widths)
+
+
 def test_a_state_of_many_columns_is_tiled_by_a_vector_at_least():
     assert sizes.tile_of_states(10**6, 8, np.float64) == sizes.VECTOR
 
