@@ -1,9 +1,10 @@
 """Which standard column notices which fault: one program, with a factor for every fault.
 
-A fault is a small number in a class of particles that exists for this test alone: it travels with
-the state into the operator, where the functions that `column_optics` and the ground are read by are
-replaced by ones that look it up. So all faults are columns of one batch, and one compilation serves
-them; with all factors 0 the program is the one that is guarded, which is asserted first.
+A fault is a small number in classes of particles that exist for this test alone, the same in every
+layer, as optics of particles see no other: it travels with the state into the operator, where the
+functions that optics and the ground are read by are replaced by ones that look it up. So all faults
+are columns of one batch, and one compilation serves them; with all factors 0 the program is the one
+that is guarded, which is asserted first.
 """
 
 import importlib
@@ -27,6 +28,8 @@ FACTORS = "factors of faults"
 (TABLE,) = (species for species in mie_species() if species not in ("smoke", "ash"))
 SCALED = ("rayleigh", "gases", "smoke", "ash", TABLE, "liquid", "ice", "snow", "rain")
 OTHERS = ("ground", "sign of a derivative", "float32", "default of snow")
+FAULTS = (*SCALED, *OTHERS)
+CARRIERS = tuple(f"{FACTORS} {k}" for k in range((len(FAULTS) + 1) // 2))
 # A scale of 1.001; a derivative's sign turned; rounding to float32; another shape of snow.
 SIZES = dict.fromkeys(SCALED, 1e-3) | {"ground": 1e-3, "default of snow": 0.1}
 SIZES |= {"sign of a derivative": 2.0, "float32": 1.0}
@@ -62,10 +65,10 @@ BY_DERIVATIVE = dict.fromkeys(("smoke", "ash", TABLE, "sign of a derivative"), D
 
 
 def factors_of(atmosphere):
-    """Factors by fault, in the state that a producer is given."""
-    carrier = atmosphere.hydrometeors[FACTORS]
-    numbers = jnp.concatenate([carrier.mass_path, carrier.number_path - 1])
-    return {name: numbers[k] for k, name in enumerate((*SCALED, *OTHERS))}
+    """Factors by fault, in the state that a producer is given: two in a class of particles."""
+    carriers = [atmosphere.hydrometeors[name] for name in CARRIERS]
+    numbers = [x[0] for c in carriers for x in (c.mass_path, c.number_path - 1)]
+    return dict(zip(FAULTS, numbers, strict=False))
 
 
 def scaled(optics, factor):
@@ -103,8 +106,8 @@ def producers():
 
     def faulty_hydrometeor(atmosphere, name, band):
         factors = factors_of(atmosphere)
-        if name == FACTORS:
-            nothing = jnp.zeros((1, atmosphere.height.shape[0] - 1))
+        if name in CARRIERS:
+            nothing = jnp.zeros_like(atmosphere.hydrometeors[name].mass_path)[None]
             return OpticalProperties(nothing, jnp.ones(1), ())
         snow = CLASSES["snow"]
         classes = CLASSES | {"snow": snow._replace(nu=snow.nu + factors["default of snow"])}
@@ -120,16 +123,15 @@ def producers():
 
 
 def carrying(state, fault=None):
-    """The state with the factors of one fault, or none, in a class of its own."""
-    numbers = [SIZES[name] if name == fault else 0.0 for name in (*SCALED, *OTHERS)]
+    """The state with the factors of one fault, or none, in classes of their own."""
     air = state.atmosphere
-    num_layers = air.height.shape[0] - 1
-    numbers = np.pad(numbers, (0, 2 * num_layers - len(numbers)))
+    every = jnp.ones(air.height.shape[0] - 1)
+    numbers = [SIZES[name] if name == fault else 0.0 for name in FAULTS]
+    pairs = np.pad(numbers, (0, len(numbers) % 2)).reshape(-1, 2)
     # Where there is mass there must be a number, so numbers begin at 1.
-    carrier = Hydrometeor(jnp.asarray(numbers[:num_layers]), jnp.asarray(1 + numbers[num_layers:]))
-    return replace(
-        state, atmosphere=replace(air, hydrometeors=air.hydrometeors | {FACTORS: carrier})
-    )
+    carriers = [Hydrometeor(x * every, (1 + y) * every) for x, y in pairs]
+    classes = air.hydrometeors | dict(zip(CARRIERS, carriers, strict=True))
+    return replace(state, atmosphere=replace(air, hydrometeors=classes))
 
 
 def evaluations():
@@ -150,7 +152,7 @@ def evaluations():
             for fault in (None, *CATCHES)
             for name, state in states.items()
         }
-        # The class of factors makes these states a structure that no other test compiles.
+        # The classes of factors make these states a structure that no other test compiles.
         every = guard.evaluate(columns, SEEN)
     inputs = [name for name in every.inputs if FACTORS not in name]
     found, names = {}, tuple(states)
