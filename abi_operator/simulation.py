@@ -135,33 +135,34 @@ def open_scene(request: Request) -> Scene:
     fires = None if request.fires is None else read_fires(request.fires)
     inside = None
     tops, present, hot_ground = [], set(), False
-    for time in times:
-        place = series.coordinates(time)
-        check_sight(place, request.satellite, request.satellite_longitude)
-        check_ground(
-            place,
-            request.bands,
-            albedo,
-            request.ocean_albedo,
-            request.emissivity,
-            request.land_albedo,
-            request.ocean_wind,
-        )
-        if fires is not None:
-            found = fires_inside(fires, place)
-            inside = found if inside is None else inside | found
-        for rows in row_blocks(shape, _BLOCK_COLUMNS):
-            model = series.read(time, rows)
-            check_land_albedo(request.land_albedo, model)
-            if request.ocean_wind is not None:
-                check_ocean_wind(request.ocean_wind, model)
-            if set(request.bands) & set(THERMAL):
-                check_emissivity(request.emissivity, model)
-            if request.droplet_number is not None:
-                request.droplet_number.over(model)
-            tops.append(highest_top(model))
-            hot_ground = hot_ground or has_hot_ground(model)
-            present.update(classes_present(model, request.microphysics))
+    with series.opened() as read:
+        for time in times:
+            place = series.coordinates(time)
+            check_sight(place, request.satellite, request.satellite_longitude)
+            check_ground(
+                place,
+                request.bands,
+                albedo,
+                request.ocean_albedo,
+                request.emissivity,
+                request.land_albedo,
+                request.ocean_wind,
+            )
+            if fires is not None:
+                found = fires_inside(fires, place)
+                inside = found if inside is None else inside | found
+            for rows in row_blocks(shape, _BLOCK_COLUMNS):
+                model = read(time, rows)
+                check_land_albedo(request.land_albedo, model)
+                if request.ocean_wind is not None:
+                    check_ocean_wind(request.ocean_wind, model)
+                if set(request.bands) & set(THERMAL):
+                    check_emissivity(request.emissivity, model)
+                if request.droplet_number is not None:
+                    request.droplet_number.over(model)
+                tops.append(highest_top(model))
+                hot_ground = hot_ground or has_hot_ground(model)
+                present.update(classes_present(model, request.microphysics))
     if inside is not None:
         check_fires(inside, request.bands)
     scene = Scene(
@@ -290,22 +291,25 @@ def simulate_scene(scene: Scene, folder: Path) -> Report:
     """
     request, specify = scene.request, _specified(scene)
 
-    def read_block(time: int, rows: slice) -> xr.Dataset:
-        return rounded(specify(scene.series.read(scene.chosen_times[time], rows), rows=rows))
-
     moving = bool(scene.coordinates.attrs["moving_nest"]) and len(scene.times) > 1
     painter = Painter(
         folder, scene.times, scene.shape[0], rayleigh_correction=request.rayleigh_correction
     )
     parts = Parts(folder)
-    with ResultWriter(
-        folder / RESULT,
-        times=scene.times,
-        shape=scene.shape,
-        moving=moving,
-        grid=None if moving else projected(scene.coordinates),
-        command=request.command,
-    ) as writer:
+    with (
+        scene.series.opened() as read,
+        ResultWriter(
+            folder / RESULT,
+            times=scene.times,
+            shape=scene.shape,
+            moving=moving,
+            grid=None if moving else projected(scene.coordinates),
+            command=request.command,
+        ) as writer,
+    ):
+
+        def read_block(time: int, rows: slice) -> xr.Dataset:
+            return rounded(specify(read(scene.chosen_times[time], rows), rows=rows))
 
         def write_block(time: int, rows: slice, result: xr.Dataset) -> None:
             writer.write(time, rows, stored(result, request.variables))

@@ -2,11 +2,12 @@
 
     python benchmarks/roofline.py [--streams 4 8 16 32] [--columns 1000]
 
-counts the multiply-adds of the value, times it on the columns of `solver.py`, and sets its rate
-beside two of the same cores in the same run: a large matrix product (all that the processor can
-do), and nothing but products of the solver's own small matrices, by its own kernel, one tile of
-columns a core (all that this layout can do). Float64; one CPU device of JAX for each core that the
-command may use.
+counts the multiply-adds of the value and of value and gradient, times both on the columns of
+`solver.py`, and sets their rates beside two of the same cores in the same run: a large matrix
+product (all that the processor can do), and nothing but products of the solver's own small
+matrices, by its own kernel, one tile of columns a core (all that this layout can do). In values,
+the arithmetic of a gradient is what its time would be if both ran at one rate. Float64; one CPU
+device of JAX for each core that the command may use.
 """
 
 import argparse
@@ -35,6 +36,28 @@ def multiply_adds(num_streams, num_layers, num_doublings):
     sums = (4 + 2 * num_doublings) * n * (n + 2)
     layer = kernels + inverse + (2 + num_doublings + 1) * product + sums
     return num_streams * num_layers * layer
+
+
+def of_slopes(num_streams, num_layers, num_doublings):
+    """Of the way down, likewise (`abi_operator.solver.gradient`); a number by a matrix's or a
+    border's is one multiply-add.
+    """
+    n, by_fields = num_streams // 2, min(num_doublings, 1 if num_streams <= 4 else 2)
+    border = 2 * n
+    # A quotient on fields; on one side of a cotangent and on both; a pair of fields.
+    act, one_side = n * border + 3 * border, n * n * (n + 4) + border
+    other_side, pair = n * n * (n + 2), 2 * n * n + border
+    fields, work = 1, act + 2 * border
+    for _ in range(by_fields):
+        work += fields * (act + 3 * border)
+        fields *= 2
+    work += max(2, 3 * fields // 2) * pair + 2 * n * n
+    work += (num_doublings - by_fields) * (one_side + other_side + 6 * n * n + 8 * border)
+    # The start: U, V and W on one side, W and V on the other; cotangents of A, B^-1 and Z.
+    work += 3 * one_side + 2 * other_side + 14 * n * n + 17 * border
+    # A's and B's moments: A between the functions of each degree, and B^-1 applied to these.
+    work += n**3 + 3 * n * n + 2 * n**3 + 8 * n * n + 12 * border
+    return num_streams * num_layers * work
 
 
 def elimination(n):
@@ -88,23 +111,35 @@ def main():
         given = workload.columns(options.columns, LAYERS, seed=1)
         arrays = workload.arguments(given, n)
         doublings = workload.num_doublings(n)
-        program = workload.value({"num_streams": n, "num_doublings": doublings})
-        seconds = fastest(lambda program=program, arrays=arrays: program(*arrays))
-        work = multiply_adds(n, LAYERS, doublings)
-        rate = work * options.columns / seconds
-        rows.append(
-            [
-                n,
-                doublings,
-                f"{work:,}",
-                f"{seconds / options.columns * 1e6:.1f}",
-                f"{rate / 1e9:.1f}",
-                f"{rate / highest:.0%}",
-                f"{rate / small_products(n, cores):.0%}",
-            ]
-        )
-    head = ["streams", "doublings", "multiply-adds a column", "microseconds", "10^9 a second"]
-    table([*head, "of a large product", "of small products"], rows)
+        solved = {"num_streams": n, "num_doublings": doublings}
+        up = multiply_adds(n, LAYERS, doublings)
+        programs = {
+            "value": (workload.value(solved), up),
+            "value + gradient": (
+                workload.gradient(solved),
+                up + of_slopes(n, LAYERS, doublings),
+            ),
+        }
+        small, alone = small_products(n, cores), None
+        for name, (program, work) in programs.items():
+            seconds = fastest(lambda program=program, arrays=arrays: program(*arrays))
+            alone = alone or seconds
+            rate = work * options.columns / seconds
+            rows.append(
+                [
+                    n,
+                    name,
+                    f"{work:,}",
+                    f"{work / up:.2f}",
+                    f"{seconds / options.columns * 1e6:.1f}",
+                    f"{seconds / alone:.2f}",
+                    f"{rate / 1e9:.1f}",
+                    f"{rate / highest:.0%}",
+                    f"{rate / small:.0%}",
+                ]
+            )
+    head = ["streams", "program", "multiply-adds a column", "in values", "microseconds"]
+    table([*head, "in values", "10^9 a second", "of a large product", "of small products"], rows)
 
 
 if __name__ == "__main__":

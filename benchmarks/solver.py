@@ -7,7 +7,7 @@ that is installed (extra `benchmark`), in rounds in which each has its turn on c
 before had. Beside the time stands the error of those very calls. All solve on the nodes of double
 Gauss, which others have, so that they agree to rounding; times are the same on our own. `--sweep`
 (see --help) measures against batch, layers, streams or precision, memory and compiling, Jacobians
-and `jax.vmap`.
+and `jax.vmap`, and a `jax.jit` of the caller's that names no number of doublings.
 `--plain` times a user's script without any setting instead, beside a process tuned by hand, or
 with `--sweep batch` in batches up to `--largest`.
 `--check` judges all that was measured and exits with 1 where a bar is missed.

@@ -17,6 +17,8 @@ from peers import Peers, peak_memory, usable_peers
 from plain import GROWTH, LARGE_BATCH
 from rounds import AGREE, Program, Rounds, apart, digits, table
 
+from abi_operator.solver.method.doublings import sufficient_doublings
+
 BATCHES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000)
 LAYERS = (1, 2, 5, 10, 20, 40, 60)
 STREAMS = (2, 4, 6, 8, 12, 16, 24, 32)
@@ -26,6 +28,7 @@ FEW_LAYERS = 20  # linear in layers from
 FLOAT32_STREAMS, FLOAT32_GAIN = (8, 16), 1.6
 MAPPED_SHARE = 0.7  # of the built-in batch's speed
 JACOBIAN_COST = 1.3  # times value + gradient of the same columns
+UNNAMED_COST = 1.1  # of a call that names no number of doublings, times the best that does
 COMPILE_STREAMS, COMPILE_SECONDS = 16, {"value": 20, "value + gradient": 40}
 # Copies of what goes in and comes out that may live at a time: the argument on the device, with its
 # columns last, in tiles, and as much of derivatives again.
@@ -161,6 +164,34 @@ def derivatives(rounds, options, bars):
         bars.judge(error <= AGREE, f"jacfwd and jacrev at {n} differ by {error:.0e}")
 
 
+def doublings(rounds, options, bars):
+    """Under a `jax.jit` of the caller's, where nobody reads the layers: no number of doublings
+    named, and the numbers that are enough for them, of which slopes have less room to keep."""
+    print(f"Doublings of what a caller jits, {options.columns} columns:\n")
+    rows, thickest = [], (workload.MAX_TAU, workload.MIN_MU)
+    for n in options.sweep_streams or USUAL_STREAMS:
+        for kind in (np.float64, np.float32):
+            fewest = sufficient_doublings(*thickest, n, kind)
+            programs = {}
+            for k in (None, fewest, fewest + 1):
+                settings = {"num_streams": n, "num_doublings": k}
+                programs["value", k] = Program(workload.jitted_value(settings))
+                programs["value + gradient", k] = Program(workload.gradient(settings))
+            t = rounds.run(programs, n, options.layers, options.columns, [], dtype=kind)
+            for name in ("value", "value + gradient"):
+                own = t[name, None]
+                best = min((fewest, fewest + 1), key=lambda k: t[name, k].microseconds)
+                named = t[name, best]
+                cost, error = own.microseconds / named.microseconds, apart(own.brf, named.brf)
+                row = [f"{n} {kind.__name__}", name, digits(own.microseconds), own.spread]
+                row += [best, digits(named.microseconds), named.spread]
+                rows.append([*row, f"{cost:.2f}", f"{error:.0e}"])
+                text = f"{name} at {n} {kind.__name__} costs {cost:.2f} of doublings that are named"
+                bars.judge(cost <= UNNAMED_COST, text)
+    head = ["streams", "program", "none named [us a column]", "range", "best number", "named"]
+    table([*head, "range", "none named / named", "apart"], rows)
+
+
 def child(name, num_streams, count, num_layers):
     """Seconds and memory of one program in a process of its own."""
     command = [sys.executable, __file__, name, *map(str, (num_streams, count, num_layers))]
@@ -217,6 +248,7 @@ SWEEPS = {
     "streams": streams,
     "dtype": dtype,
     "derivatives": derivatives,
+    "doublings": doublings,
     "memory": memory,
     "compile": compiling,
 }

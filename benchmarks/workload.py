@@ -132,6 +132,12 @@ def value(options) -> Callable[..., Any]:
     return lambda *arrays: np.asarray(solve(*arrays, **options))
 
 
+def jitted_value(options):
+    """The same under a `jax.jit` of the caller's."""
+    program = jax.jit(partial(solve, **options))
+    return lambda *arrays: np.asarray(program(*arrays))
+
+
 def _summed(options, single_call):
     def total(arrays):
         brf = single_call(arrays, options)

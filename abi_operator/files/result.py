@@ -215,6 +215,9 @@ class ResultWriter:
             chunksizes=chunks if horizontal else None,
             fill_value=np.nan if kind.kind == "f" and horizontal else False,
         )
+        if horizontal:
+            # A chunk is a block, written once: the library would keep 64 MB of each variable's.
+            created.set_var_chunk_cache(size=1, nelems=1)
         created.set_auto_mask(False)
         created.setncatts(_attributes(name, array))
         if horizontal and name not in _POSITION and self._grid is not None:

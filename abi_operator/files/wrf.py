@@ -156,34 +156,45 @@ def read_wrf(path: FilePath, time: int, rows: slice = slice(None)) -> xr.Dataset
         ``level y x``, top first, with the scalar coordinate ``time`` and the corners of cells,
         which those of a block share with the rows beside it.
     """
-    with open_netcdf(path, advice=_FORMAT_ADVICE) as file:
-        require_variables(file, REQUIRED, path, ADVICE)
-        times = times_of(file, path)
-        place = {"time": time, "rows": rows, "path": path}
-        pressure = _field(file, "P", **place) + _field(file, "PB", **place)
-        _check_sum(pressure, "layer_pressure", **place)
-        theta = _field(file, "T", **place) + _THETA_OFFSET
-        fields = {
-            "layer_pressure": pressure,
-            "layer_temperature": theta * (pressure / _THETA_PRESSURE) ** KAPPA,
-            "height": (_field(file, "PH", **place) + _field(file, "PHB", **place)) / GRAVITY,
-        }
-        for name, ours in VARIABLE_MAP.items():
-            if name in file and ours.endswith(_TAKEN_AS_THEY_ARE):
-                field = _field(file, name, **place)
-                adds = ours == _FURTHER_ICE and ours in fields
-                fields[ours] = fields[ours] + field if adds else field
-        _check_sum(fields["layer_temperature"], "layer_temperature", **place)
-        _check_sum(fields["height"], "height", **place)
-        land_mask = _land_mask(file, **place)
-        if land_mask is not None:
-            fields["land_mask"] = land_mask
-        coords = {
-            "time": times[time],
-            "latitude": _field(file, "XLAT", **place),
-            "longitude": _field(file, "XLONG", **place),
-        } | _bounds(file, **place)
-        attributes = run_attributes(file)
+    with opened_wrf(path) as file:
+        return block_of_wrf(file, path, time, rows)
+
+
+def opened_wrf(path: FilePath) -> xr.Dataset:
+    """A WRF file for `block_of_wrf`, to be closed or used as a context manager."""
+    return open_netcdf(path, advice=_FORMAT_ADVICE)
+
+
+def block_of_wrf(file: xr.Dataset, path: FilePath, time: int, rows: slice) -> xr.Dataset:
+    """`read_wrf` of a file that is open, of which the library unpacks a chunk once for all blocks
+    of rows that it has a part of."""
+    require_variables(file, REQUIRED, path, ADVICE)
+    times = times_of(file, path)
+    place = {"time": time, "rows": rows, "path": path}
+    pressure = _field(file, "P", **place) + _field(file, "PB", **place)
+    _check_sum(pressure, "layer_pressure", **place)
+    theta = _field(file, "T", **place) + _THETA_OFFSET
+    fields = {
+        "layer_pressure": pressure,
+        "layer_temperature": theta * (pressure / _THETA_PRESSURE) ** KAPPA,
+        "height": (_field(file, "PH", **place) + _field(file, "PHB", **place)) / GRAVITY,
+    }
+    for name, ours in VARIABLE_MAP.items():
+        if name in file and ours.endswith(_TAKEN_AS_THEY_ARE):
+            field = _field(file, name, **place)
+            adds = ours == _FURTHER_ICE and ours in fields
+            fields[ours] = fields[ours] + field if adds else field
+    _check_sum(fields["layer_temperature"], "layer_temperature", **place)
+    _check_sum(fields["height"], "height", **place)
+    land_mask = _land_mask(file, **place)
+    if land_mask is not None:
+        fields["land_mask"] = land_mask
+    coords = {
+        "time": times[time],
+        "latitude": _field(file, "XLAT", **place),
+        "longitude": _field(file, "XLONG", **place),
+    } | _bounds(file, **place)
+    attributes = run_attributes(file)
     dataset = xr.Dataset({n: _finish(f, n) for n, f in fields.items()}, coords, attributes)
     _check_columns(dataset, path)
     return dataset

@@ -1,7 +1,8 @@
 """Output files of one run of WRF as one series of times; one time a file is the rule."""
 
 import glob
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,7 +12,7 @@ import xarray as xr
 
 from .errors import InputError
 from .netcdf import FilePath, open_netcdf
-from .wrf import read_wrf, wrf_coordinates
+from .wrf import block_of_wrf, opened_wrf, read_wrf, wrf_coordinates
 
 # What files of one grid of one run have in common.
 _DIMENSIONS = ("south_north", "west_east", "bottom_top")
@@ -62,6 +63,32 @@ class WrfSeries(NamedTuple):
         """As `read_wrf`, of one of all times."""
         path, time = self.places[index]
         return read_wrf(path, time, rows)
+
+    @contextmanager
+    def opened(self) -> Iterator[Callable[[int, slice], xr.Dataset]]:
+        """`read` for blocks one after the other, as a context manager.
+
+        A file stays open until another is read: of one that is compressed the library unpacks a
+        chunk, often of half the rows, for all blocks of its rows, and not for each again.
+        """
+        files: dict[Path, xr.Dataset] = {}
+
+        def read(index: int, rows: slice = slice(None)) -> xr.Dataset:
+            path, time = self.places[index]
+            if path not in files:
+                close()
+                files[path] = opened_wrf(path)
+            return block_of_wrf(files[path], path, time, rows)
+
+        def close() -> None:
+            for file in files.values():
+                file.close()
+            files.clear()
+
+        try:
+            yield read
+        finally:
+            close()
 
     def find(self, wanted: int | str | None) -> tuple[int, ...]:
         """Indices of times.

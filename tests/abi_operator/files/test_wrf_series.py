@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from abi_operator.files import InputError, open_wrf_series, read_wrf
+from abi_operator.files import InputError, open_wrf_series, read_wrf, wrf_series
 
 
 @pytest.fixture
@@ -58,6 +58,34 @@ def test_times_of_all_files_come_in_order(one_time_each):
     assert series.coordinates(1).sizes == {"time": 3, "y": 3, "x": 2}
     assert series.read(1, slice(1, 3)).identical(read_wrf(a, 0, slice(1, 3)))
     assert open_wrf_series(c).places == ((c, 0),)
+
+
+def test_blocks_of_files_that_stay_open(one_time_each, monkeypatch):
+    """As by `read`, but that a file is opened once for its blocks, and closed before the next."""
+    series = open_wrf_series(one_time_each)
+    opened, closed, whole = [], [], wrf_series.opened_wrf
+
+    def noted(path):
+        file = whole(path)
+
+        def close():
+            closed.append(path)
+            file.close()
+
+        told = file.copy()
+        told.set_close(close)
+        opened.append(path)
+        return told
+
+    monkeypatch.setattr(wrf_series, "opened_wrf", noted)
+    (first, _), (second, _), _ = series.places
+    with pytest.raises(KeyboardInterrupt), series.opened() as read:
+        for time in range(2):
+            for rows in (slice(0, 1), slice(1, 3)):
+                assert read(time, rows).identical(series.read(time, rows))
+        assert (opened, closed) == ([first, second], [first])
+        raise KeyboardInterrupt
+    assert closed == [first, second]
 
 
 def test_patterns_stand_for_the_files_that_match(one_time_each, tmp_path):
