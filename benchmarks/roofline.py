@@ -2,12 +2,12 @@
 
     python benchmarks/roofline.py [--streams 4 8 16 32] [--columns 1000]
 
-counts the multiply-adds of the value and of value and gradient, times both on the columns of
-`solver.py`, and sets their rates beside two of the same cores in the same run: a large matrix
-product (all that the processor can do), and nothing but products of the solver's own small
-matrices, by its own kernel, one tile of columns a core (all that this layout can do). In values,
-the arithmetic of a gradient is what its time would be if both ran at one rate. Float64; one CPU
-device of JAX for each core that the command may use.
+counts the multiplications of the value and of value and gradient (`roofline_count.py`), times both
+on the columns of `solver.py`, and sets their rates beside two of the same cores in the same run: a
+large matrix product (all that the processor can do), and nothing but products of the solver's own
+small matrices, by its own kernel, one tile of columns a core. In values, the arithmetic of a
+gradient is what its time would be if both ran at one rate. Float64; one CPU device of JAX for each
+core that the command may use.
 """
 
 import argparse
@@ -18,54 +18,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import workload
+from roofline_count import up_and_down
 from rounds import table
 
 from abi_operator.machine.algebra import matmul
 from abi_operator.machine.sizes import tile_size
 
 LAYERS = 20
-
-
-def multiply_adds(num_streams, num_layers, num_doublings):
-    """Of one column with one view, all modes, in matrices and their two borders."""
-    n = num_streams // 2
-    kernels = 2 * n * n * n + 2 * 2 * n * n
-    inverse = n**3
-    # Elimination, substitution and a product; every core is symmetric, so half could be spared.
-    product = elimination(n) + 2 * n * n * (n + 2)
-    sums = (4 + 2 * num_doublings) * n * (n + 2)
-    layer = kernels + inverse + (2 + num_doublings + 1) * product + sums
-    return num_streams * num_layers * layer
-
-
-def of_slopes(num_streams, num_layers, num_doublings):
-    """Of the way down, likewise (`abi_operator.solver.gradient`); a number by a matrix's or a
-    border's is one multiply-add.
-    """
-    n, by_fields = num_streams // 2, min(num_doublings, 1 if num_streams <= 4 else 2)
-    border = 2 * n
-    # A quotient on fields; on one side of a cotangent and on both; a pair of fields.
-    act, one_side = n * border + 3 * border, n * n * (n + 4) + border
-    other_side, pair = n * n * (n + 2), 2 * n * n + border
-    fields, work = 1, act + 2 * border
-    for _ in range(by_fields):
-        work += fields * (act + 3 * border)
-        fields *= 2
-    work += max(2, 3 * fields // 2) * pair + 2 * n * n
-    work += (num_doublings - by_fields) * (one_side + other_side + 6 * n * n + 8 * border)
-    # The start: U, V and W on one side, W and V on the other; cotangents of A, B^-1 and Z.
-    work += 3 * one_side + 2 * other_side + 14 * n * n + 17 * border
-    # A's and B's moments: A between the functions of each degree, and B^-1 applied to these.
-    work += n**3 + 3 * n * n + 2 * n**3 + 8 * n * n + 12 * border
-    return num_streams * num_layers * work
-
-
-def elimination(n):
-    """Multiply-adds before the right sides: halves, p^-1 q and the Schur complement."""
-    half, rest = n // 2, n - n // 2
-    if n <= 2:
-        return n * n
-    return elimination(half) + half * half * rest + rest * rest * half + elimination(rest)
 
 
 def fastest(call, repeats=7):
@@ -112,13 +71,10 @@ def main():
         arrays = workload.arguments(given, n)
         doublings = workload.num_doublings(n)
         solved = {"num_streams": n, "num_doublings": doublings}
-        up = multiply_adds(n, LAYERS, doublings)
+        up, down = (n * LAYERS * count for count in up_and_down(n, doublings))
         programs = {
             "value": (workload.value(solved), up),
-            "value + gradient": (
-                workload.gradient(solved),
-                up + of_slopes(n, LAYERS, doublings),
-            ),
+            "value + gradient": (workload.gradient(solved), up + down),
         }
         small, alone = small_products(n, cores), None
         for name, (program, work) in programs.items():
@@ -138,7 +94,7 @@ def main():
                     f"{rate / small:.0%}",
                 ]
             )
-    head = ["streams", "program", "multiply-adds a column", "in values", "microseconds"]
+    head = ["streams", "program", "multiplications a column", "in values", "microseconds"]
     table([*head, "in values", "10^9 a second", "of a large product", "of small products"], rows)
 
 

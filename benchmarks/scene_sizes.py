@@ -19,6 +19,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from plain import without_settings
 from rounds import Bars, table
 
 from abi_operator import __version__
@@ -45,9 +46,9 @@ def drawn(folder, size):
 
 
 def settings(folder):
-    """Surroundings of a process: this one's, with a folder of its own for compiled programs."""
+    """Surroundings of a process: no setting of JAX or XLA, and a folder for compiled programs."""
     own = {"XDG_CACHE_HOME": str(folder / "cache")}
-    return os.environ | own | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    return without_settings() | own | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
 
 def simulated(folder, inputs):

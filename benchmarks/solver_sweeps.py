@@ -188,6 +188,7 @@ def doublings(rounds, options, bars):
                 rows.append([*row, f"{cost:.2f}", f"{error:.0e}"])
                 text = f"{name} at {n} {kind.__name__} costs {cost:.2f} of doublings that are named"
                 bars.judge(cost <= UNNAMED_COST, text)
+                bars.judge(error <= AGREE, f"{text}, and is {error:.0e} apart")
     head = ["streams", "program", "none named [us a column]", "range", "best number", "named"]
     table([*head, "range", "none named / named", "apart"], rows)
 
